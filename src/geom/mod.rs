@@ -1,0 +1,1 @@
+//! Exact and small geometry: no files, no threads, no cells.

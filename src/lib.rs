@@ -1,0 +1,22 @@
+//! Repairs broken 3D models out of core.
+//!
+//! Any polygon soup goes in; a closed, 2-manifold, consistently oriented surface comes out, at any
+//! octree depth, inside the memory that the caller granted.
+//!
+//! ```text
+//! file -> ingest -> scan -> patch -> sign -> contour -> verify -> file
+//!           |        |        |       |        |
+//!          bins    bricks   flips   signs    cells      (all on disk, in the work folder)
+//! ```
+//!
+//! Guaranteed of every file that is put in place: closed, edge- and vertex-manifold, outward
+//! oriented, free of degenerate triangles, proved on the file as written.
+//!
+//! Refused: input that cannot be parsed, input in which no triangle is left, memory budgets below
+//! the floor, output grids too coarse for the depth. `ARCHITECTURE.md` shows the rooms and their
+//! invariants.
+
+pub mod geom;
+pub mod mesh;
+pub mod monitor;
+pub mod store;

@@ -1,0 +1,2 @@
+//! brickmend
+fn main() {}

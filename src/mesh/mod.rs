@@ -1,0 +1,11 @@
+//! Triangles on their way in and out: batches, names, and the two ends of the pipeline.
+//!
+//! Formats end at [`MeshSource`] and [`MeshSink`]; no stage knows a file format.
+
+mod batch;
+mod sink;
+mod source;
+
+pub use batch::{Material, NO_POLYGON, Part, TriangleBatch};
+pub use sink::{MeshSink, SinkStats};
+pub use source::{Discarded, MeshSource};

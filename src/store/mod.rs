@@ -1,0 +1,21 @@
+//! Bytes on disk and in memory: brick files, sorts, tables, unions, and the one accountant.
+//!
+//! Nothing here knows what a cell or a triangle is. Everything that can outgrow its share of the
+//! memory budget has a form on disk that gives the same answer.
+
+mod accountant;
+mod error;
+mod scratch;
+mod sort;
+mod table;
+mod unite;
+
+pub use accountant::{Accountant, Lease};
+pub use error::StoreError;
+pub use scratch::{Scratch, sync_folder};
+pub use sort::{Record, Sorted, Sorter};
+pub use table::Table;
+pub use unite::{Labels, Unite};
+
+/// Version of every file in a work folder; another version is discarded, never guessed at.
+pub const FORMAT_VERSION: u32 = 1;

@@ -1,0 +1,303 @@
+//! External sort of fixed records: in memory while they fit the share, in merged runs beyond.
+//!
+//! In:         records, in any order.
+//! Out:        the same records by ascending key.
+//! Invariant:  keys are total (records with equal keys are interchangeable), so the result does not
+//!             depend on the share.
+//! Memory:     `share_bytes`, at least one page per merged run.
+//! Fails:      only as [`StoreError`].
+//! Source:     Knuth, The Art of Computer Programming 3, 5.4 (multiway merging).
+
+use std::cmp::Reverse;
+use std::collections::BinaryHeap;
+use std::fs::File;
+
+use bytemuck::Pod;
+
+use crate::store::{Scratch, StoreError};
+
+/// A fixed-size record with a total sort key.
+pub trait Record: Pod + Send + Sync {
+    /// What it is sorted by. Two records with equal keys must be interchangeable.
+    type Key: Ord + Copy + Send + Sync;
+    /// The record's key.
+    fn key(&self) -> Self::Key;
+}
+
+/// Smallest read buffer of a run in a merge.
+const PAGE_BYTES: usize = 4096;
+
+/// Collects records and sorts them.
+pub struct Sorter<R: Record> {
+    scratch: Scratch,
+    share_bytes: usize,
+    buffer: Vec<R>,
+    runs: Runs,
+}
+
+#[derive(Default)]
+struct Runs {
+    file: Option<File>,
+    end: u64,
+    extents: Vec<(u64, u64)>,
+}
+
+impl<R: Record> Sorter<R> {
+    /// A sorter that keeps at most `share_bytes` in memory.
+    #[must_use]
+    pub fn new(scratch: &Scratch, share_bytes: u64) -> Self {
+        let least = 4 * PAGE_BYTES.max(size_of::<R>());
+        let share_bytes = usize::try_from(share_bytes).unwrap_or(usize::MAX).max(least);
+        Self { scratch: scratch.clone(), share_bytes, buffer: Vec::new(), runs: Runs::default() }
+    }
+
+    /// Adds a record.
+    ///
+    /// # Errors
+    /// A full buffer cannot be written.
+    #[inline]
+    pub fn push(&mut self, record: R) -> Result<(), StoreError> {
+        if self.buffer.len() == self.buffer.capacity() {
+            self.make_room()?;
+        }
+        self.buffer.push(record);
+        Ok(())
+    }
+
+    /// Adds many records.
+    ///
+    /// # Errors
+    /// A full buffer cannot be written.
+    pub fn extend(&mut self, records: &[R]) -> Result<(), StoreError> {
+        records.iter().try_for_each(|record| self.push(*record))
+    }
+
+    /// Whether nothing was added.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.buffer.is_empty() && self.runs.extents.is_empty()
+    }
+
+    /// Grows the buffer up to its share, and spills it once the share is full.
+    fn make_room(&mut self) -> Result<(), StoreError> {
+        let most = self.share_bytes / size_of::<R>();
+        let now = self.buffer.capacity();
+        if now < most {
+            // Growth by doubling would hold old and new at once: near the end it goes in one step.
+            let next = if now * 4 >= most { most } else { (now * 2).max(64).min(most) };
+            self.buffer.reserve_exact(next - self.buffer.len());
+            return Ok(());
+        }
+        self.spill()
+    }
+
+    fn spill(&mut self) -> Result<(), StoreError> {
+        self.buffer.sort_unstable_by_key(Record::key);
+        self.runs.append(&self.scratch, bytemuck::cast_slice(&self.buffer), self.buffer.len())?;
+        self.buffer.clear();
+        self.scratch.count_spill();
+        Ok(())
+    }
+
+    /// Ends the input and starts the sorted stream.
+    ///
+    /// # Errors
+    /// Runs cannot be written or read.
+    pub fn finish(mut self) -> Result<Sorted<R>, StoreError> {
+        if self.runs.extents.is_empty() {
+            self.buffer.sort_unstable_by_key(Record::key);
+            return Ok(Sorted { source: SortedSource::Memory(self.buffer.into_iter()) });
+        }
+        if !self.buffer.is_empty() {
+            self.spill()?;
+        }
+        self.buffer = Vec::new();
+        let fan_in = (self.share_bytes / PAGE_BYTES.max(size_of::<R>())).max(2);
+        while self.runs.extents.len() > fan_in {
+            self.cascade(fan_in)?;
+        }
+        let merge = Merge::new(&self.scratch, self.runs, self.share_bytes)?;
+        Ok(Sorted { source: SortedSource::Merge(Box::new(merge)) })
+    }
+
+    /// Merges groups of `fan_in` runs into longer runs, in a new file.
+    fn cascade(&mut self, fan_in: usize) -> Result<(), StoreError> {
+        let old = std::mem::take(&mut self.runs);
+        let file = old.file.as_ref();
+        for group in old.extents.chunks(fan_in - 1) {
+            let handle = file.map(File::try_clone).transpose();
+            let handle = handle.map_err(|e| StoreError::io("reopen", self.scratch.folder(), e))?;
+            let part = Runs { file: handle, end: old.end, extents: group.to_vec() };
+            let mut merge = Merge::<R>::new(&self.scratch, part, self.share_bytes)?;
+            let start = self.runs.end;
+            let mut count = 0;
+            let mut block: Vec<R> = Vec::with_capacity(PAGE_BYTES.div_ceil(size_of::<R>()));
+            while let Some(record) = merge.next()? {
+                block.push(record);
+                count += 1;
+                if block.len() == block.capacity() {
+                    self.runs.write(&self.scratch, bytemuck::cast_slice(&block))?;
+                    block.clear();
+                }
+            }
+            self.runs.write(&self.scratch, bytemuck::cast_slice(&block))?;
+            self.runs.extents.push((start, count));
+        }
+        Ok(())
+    }
+}
+
+impl Runs {
+    fn append(&mut self, scratch: &Scratch, bytes: &[u8], count: usize) -> Result<(), StoreError> {
+        let start = self.end;
+        self.write(scratch, bytes)?;
+        self.extents.push((start, count as u64));
+        Ok(())
+    }
+
+    fn write(&mut self, scratch: &Scratch, bytes: &[u8]) -> Result<(), StoreError> {
+        if self.file.is_none() {
+            self.file = Some(scratch.anonymous("sort")?);
+        }
+        let file = self.file.as_ref().expect("the file was opened above");
+        scratch.write_at(file, bytes, self.end)?;
+        self.end += bytes.len() as u64;
+        Ok(())
+    }
+}
+
+/// Records by ascending key.
+pub struct Sorted<R: Record> {
+    source: SortedSource<R>,
+}
+
+enum SortedSource<R: Record> {
+    Memory(std::vec::IntoIter<R>),
+    Merge(Box<Merge<R>>),
+}
+
+impl<R: Record> Sorted<R> {
+    /// The next record, `None` at the end.
+    ///
+    /// # Errors
+    /// A run cannot be read.
+    #[inline]
+    #[expect(clippy::should_implement_trait, reason = "an iterator could not fail in the open")]
+    pub fn next(&mut self) -> Result<Option<R>, StoreError> {
+        match &mut self.source {
+            SortedSource::Memory(records) => Ok(records.next()),
+            SortedSource::Merge(merge) => merge.next(),
+        }
+    }
+}
+
+struct Merge<R: Record> {
+    scratch: Scratch,
+    file: File,
+    cursors: Vec<Cursor<R>>,
+    heap: BinaryHeap<Reverse<(R::Key, usize)>>,
+    block_records: usize,
+}
+
+struct Cursor<R> {
+    offset: u64,
+    left: u64,
+    block: Vec<R>,
+    at: usize,
+}
+
+impl<R: Record> Merge<R> {
+    fn new(scratch: &Scratch, runs: Runs, share_bytes: usize) -> Result<Self, StoreError> {
+        let file = runs.file.expect("a merge has runs");
+        let block_records = (share_bytes / runs.extents.len() / size_of::<R>()).max(1);
+        let cursors = runs
+            .extents
+            .iter()
+            .map(|&(offset, left)| Cursor { offset, left, block: Vec::new(), at: 0 })
+            .collect::<Vec<_>>();
+        let heap = BinaryHeap::with_capacity(cursors.len());
+        let mut merge = Self { scratch: scratch.clone(), file, cursors, heap, block_records };
+        for run in 0..merge.cursors.len() {
+            merge.advance(run)?;
+        }
+        Ok(merge)
+    }
+
+    /// Puts the next record of `run` on the heap, reading its next block when needed.
+    fn advance(&mut self, run: usize) -> Result<(), StoreError> {
+        let cursor = &mut self.cursors[run];
+        if cursor.at == cursor.block.len() {
+            let count = (cursor.left).min(self.block_records as u64) as usize;
+            if count == 0 {
+                cursor.block = Vec::new();
+                cursor.at = 0;
+                return Ok(());
+            }
+            cursor.block.resize(count, R::zeroed());
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut cursor.block);
+            self.scratch.read_at(&self.file, bytes, cursor.offset)?;
+            cursor.offset += (count * size_of::<R>()) as u64;
+            cursor.left -= count as u64;
+            cursor.at = 0;
+        }
+        let key = cursor.block[cursor.at].key();
+        self.heap.push(Reverse((key, run)));
+        Ok(())
+    }
+
+    fn next(&mut self) -> Result<Option<R>, StoreError> {
+        let Some(Reverse((_, run))) = self.heap.pop() else { return Ok(None) };
+        let cursor = &mut self.cursors[run];
+        let record = cursor.block[cursor.at];
+        cursor.at += 1;
+        self.advance(run)?;
+        Ok(Some(record))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    impl Record for u64 {
+        type Key = Self;
+        fn key(&self) -> Self {
+            *self
+        }
+    }
+
+    fn sorted(values: &[u64], share_bytes: u64) -> (Vec<u64>, u64) {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let mut sorter = Sorter::new(&scratch, share_bytes);
+        sorter.extend(values).expect("pushing works");
+        let mut stream = sorter.finish().expect("finishing works");
+        let mut out = Vec::new();
+        while let Some(value) = stream.next().expect("reading works") {
+            out.push(value);
+        }
+        (out, scratch.spilled_runs())
+    }
+
+    #[test]
+    fn a_share_of_sixteen_kib_spills_cascades_and_sorts_alike() {
+        let values: Vec<u64> =
+            (0..50_000_u64).map(|i| i.wrapping_mul(0x9E37_79B9_7F4A_7C15)).collect();
+        let (small, spilled) = sorted(&values, 16 << 10);
+        let (large, kept) = sorted(&values, 1 << 30);
+        assert_eq!(small, large);
+        assert!(small.is_sorted());
+        assert!(spilled > 16, "more runs than can be merged at once, got {spilled}");
+        assert_eq!(kept, 0);
+    }
+
+    proptest! {
+        #[test]
+        fn sorting_keeps_every_record(values in proptest::collection::vec(any::<u64>(), 0..5000)) {
+            let mut expected = values.clone();
+            expected.sort_unstable();
+            prop_assert_eq!(sorted(&values, 16 << 10).0, expected);
+        }
+    }
+}

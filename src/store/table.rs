@@ -1,0 +1,223 @@
+//! A growing array of fixed records: in memory while it fits its share, in cached blocks on disk
+//! beyond. For look-ups by number, such as the vertices of an indexed file.
+
+use std::collections::HashMap;
+use std::fs::File;
+
+use bytemuck::Pod;
+
+use crate::store::{Scratch, StoreError};
+
+/// An array of records, read and written by index.
+///
+/// Memory: `share_bytes` (at least two blocks of one page). One user at a time.
+pub struct Table<R: Pod> {
+    scratch: Scratch,
+    share_bytes: usize,
+    len: u64,
+    resident: Vec<R>,
+    paged: Option<Paged<R>>,
+}
+
+struct Paged<R> {
+    file: File,
+    block_records: usize,
+    slots: Vec<Slot<R>>,
+    slot_of_block: HashMap<u64, usize>,
+    slot_count: usize,
+    hand: usize,
+    last: (u64, usize),
+}
+
+struct Slot<R> {
+    block: u64,
+    records: Vec<R>,
+    dirty: bool,
+    used: bool,
+}
+
+const NO_BLOCK: u64 = u64::MAX;
+
+impl<R: Pod> Table<R> {
+    /// An empty table that keeps at most `share_bytes` in memory.
+    #[must_use]
+    pub fn new(scratch: &Scratch, share_bytes: u64) -> Self {
+        let share_bytes = usize::try_from(share_bytes).unwrap_or(usize::MAX).max(16 << 10);
+        Self { scratch: scratch.clone(), share_bytes, len: 0, resident: Vec::new(), paged: None }
+    }
+
+    /// The number of records.
+    #[must_use]
+    pub fn len(&self) -> u64 {
+        self.len
+    }
+
+    /// Whether there is no record.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len == 0
+    }
+
+    /// Appends a record.
+    ///
+    /// # Errors
+    /// A block cannot be written or read back.
+    pub fn push(&mut self, record: R) -> Result<(), StoreError> {
+        if self.paged.is_none() {
+            let most = self.share_bytes / size_of::<R>();
+            if self.resident.len() < most {
+                if self.resident.len() == self.resident.capacity() {
+                    let now = self.resident.capacity();
+                    let next = if now * 4 >= most { most } else { (now * 2).max(64).min(most) };
+                    self.resident.reserve_exact(next - now);
+                }
+                self.resident.push(record);
+                self.len += 1;
+                return Ok(());
+            }
+            self.page_out()?;
+        }
+        self.len += 1;
+        self.set(self.len - 1, record)
+    }
+
+    /// The record at `index`, which is below [`Table::len`].
+    ///
+    /// # Errors
+    /// A block cannot be written or read back.
+    #[inline]
+    pub fn get(&mut self, index: u64) -> Result<R, StoreError> {
+        assert!(index < self.len, "index {index} of a table of {}", self.len);
+        match &mut self.paged {
+            None => Ok(self.resident[index as usize]),
+            Some(paged) => {
+                let (slot, at) = paged.find(&self.scratch, index)?;
+                Ok(paged.slots[slot].records[at])
+            }
+        }
+    }
+
+    /// Replaces the record at `index`, which is below [`Table::len`].
+    ///
+    /// # Errors
+    /// A block cannot be written or read back.
+    #[inline]
+    pub fn set(&mut self, index: u64, record: R) -> Result<(), StoreError> {
+        assert!(index < self.len, "index {index} of a table of {}", self.len);
+        match &mut self.paged {
+            None => self.resident[index as usize] = record,
+            Some(paged) => {
+                let (slot, at) = paged.find(&self.scratch, index)?;
+                paged.slots[slot].records[at] = record;
+                paged.slots[slot].dirty = true;
+            }
+        }
+        Ok(())
+    }
+
+    /// Moves all records to disk and goes on with cached blocks.
+    fn page_out(&mut self) -> Result<(), StoreError> {
+        let file = self.scratch.anonymous("table")?;
+        self.scratch.write_at(&file, bytemuck::cast_slice(&self.resident), 0)?;
+        self.resident = Vec::new();
+        let block_bytes = (self.share_bytes / 8).clamp(4096, 64 << 10);
+        let block_records = (block_bytes / size_of::<R>()).max(1);
+        let slot_count = (self.share_bytes / (block_records * size_of::<R>())).max(2);
+        self.paged = Some(Paged {
+            file,
+            block_records,
+            slots: Vec::new(),
+            slot_of_block: HashMap::new(),
+            slot_count,
+            hand: 0,
+            last: (NO_BLOCK, 0),
+        });
+        Ok(())
+    }
+}
+
+impl<R: Pod> Paged<R> {
+    /// Slot and place in it of a record, after loading its block.
+    fn find(&mut self, scratch: &Scratch, index: u64) -> Result<(usize, usize), StoreError> {
+        let block = index / self.block_records as u64;
+        let at = (index % self.block_records as u64) as usize;
+        if self.last.0 == block {
+            return Ok((self.last.1, at));
+        }
+        let slot = match self.slot_of_block.get(&block) {
+            Some(&slot) => slot,
+            None => self.load(scratch, block)?,
+        };
+        self.slots[slot].used = true;
+        self.last = (block, slot);
+        Ok((slot, at))
+    }
+
+    /// Reads a block into a free or evicted slot (second chance).
+    fn load(&mut self, scratch: &Scratch, block: u64) -> Result<usize, StoreError> {
+        let slot = if self.slots.len() < self.slot_count {
+            let records = vec![R::zeroed(); self.block_records];
+            self.slots.push(Slot { block: NO_BLOCK, records, dirty: false, used: false });
+            self.slots.len() - 1
+        } else {
+            while std::mem::take(&mut self.slots[self.hand].used) {
+                self.hand = (self.hand + 1) % self.slots.len();
+            }
+            let slot = self.hand;
+            self.hand = (self.hand + 1) % self.slots.len();
+            slot
+        };
+        let victim = &mut self.slots[slot];
+        let block_bytes = (self.block_records * size_of::<R>()) as u64;
+        if victim.dirty {
+            let bytes: &[u8] = bytemuck::cast_slice(&victim.records);
+            scratch.write_at(&self.file, bytes, victim.block * block_bytes)?;
+        }
+        self.slot_of_block.remove(&victim.block);
+        victim.records.fill(R::zeroed());
+        read_up_to(scratch, &self.file, &mut victim.records, block * block_bytes)?;
+        victim.block = block;
+        victim.dirty = false;
+        self.slot_of_block.insert(block, slot);
+        self.last = (NO_BLOCK, 0);
+        Ok(slot)
+    }
+}
+
+/// Reads what the file holds from `offset` on; the rest stays zero (the file ends in mid-block).
+fn read_up_to<R: Pod>(
+    scratch: &Scratch,
+    file: &File,
+    records: &mut [R],
+    offset: u64,
+) -> Result<(), StoreError> {
+    let end = file.metadata().map_err(|e| StoreError::io("read from", scratch.folder(), e))?.len();
+    let bytes: &mut [u8] = bytemuck::cast_slice_mut(records);
+    let there = end.saturating_sub(offset).min(bytes.len() as u64) as usize;
+    scratch.read_at(file, &mut bytes[..there], offset)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_paged_table_answers_like_a_resident_one() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let mut table = Table::<[f64; 3]>::new(&scratch, 16 << 10);
+        for i in 0..20_000 {
+            table.push([f64::from(i), 0.5, -f64::from(i)]).expect("push works");
+        }
+        assert!(table.paged.is_some());
+        table.set(17, [1.0, 2.0, 3.0]).expect("set works");
+        let mut index = 1_u64;
+        for _ in 0..20_000 {
+            index = (index * 48_271) % 20_000;
+            let expected =
+                if index == 17 { [1.0, 2.0, 3.0] } else { [index as f64, 0.5, -(index as f64)] };
+            assert_eq!(table.get(index).expect("get works"), expected);
+        }
+        assert_eq!(table.get(17).expect("get works"), [1.0, 2.0, 3.0]);
+    }
+}
