@@ -4,16 +4,25 @@
 //! memory budget has a form on disk that gives the same answer.
 
 mod accountant;
+mod brick_file;
 mod error;
+mod manifest;
+mod mapped;
+mod pipeline;
 mod scratch;
 mod sort;
+mod spool;
 mod table;
 mod unite;
 
 pub use accountant::{Accountant, Lease};
+pub use brick_file::{Backing, BrickFile, BrickWriter, DirectoryEntry, View};
 pub use error::StoreError;
+pub use manifest::{Manifest, ManifestFile, load_manifest, save_manifest};
+pub use pipeline::ordered;
 pub use scratch::{Scratch, sync_folder};
 pub use sort::{Record, Sorted, Sorter};
+pub use spool::{Spool, SpoolReader, SpoolWriter};
 pub use table::Table;
 pub use unite::{Labels, Unite};
 

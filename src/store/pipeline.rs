@@ -1,0 +1,131 @@
+//! Read, work, write: items in order through a pool of workers, with back-pressure.
+//!
+//! Memory: at most four items per worker are under way; feeding waits until the oldest is taken.
+
+use std::collections::BTreeMap;
+
+use crossbeam::channel::bounded;
+use rayon::ThreadPool;
+
+/// Items under way per worker.
+const ITEMS_PER_WORKER: usize = 4;
+
+/// Feeds items to `work` on the threads of `pool` and hands the results to `take` in feeding order.
+///
+/// `feed` and `take` run on the calling thread, which is not one of the pool's; each worker keeps
+/// one workspace. With one thread everything runs on the calling thread.
+///
+/// # Errors
+/// The first error of `feed`, `work` (in feeding order) or `take` ends the run.
+pub fn ordered<I: Send, O: Send, W, E: Send>(
+    pool: &ThreadPool,
+    mut feed: impl FnMut() -> Result<Option<I>, E>,
+    workspace: impl Fn() -> W + Sync,
+    work: impl Fn(&mut W, I) -> Result<O, E> + Sync,
+    mut take: impl FnMut(O) -> Result<(), E>,
+) -> Result<(), E> {
+    let workers = pool.current_num_threads();
+    if workers == 1 {
+        let mut space = workspace();
+        while let Some(item) = feed()? {
+            take(work(&mut space, item)?)?;
+        }
+        return Ok(());
+    }
+    let limit = workers * ITEMS_PER_WORKER;
+    pool.in_place_scope(|scope| {
+        let (item_sender, items) = bounded::<(u64, I)>(limit);
+        let (result_sender, results) = bounded::<(u64, Result<O, E>)>(limit);
+        for _ in 0..workers {
+            let (items, result_sender) = (items.clone(), result_sender.clone());
+            let (workspace, work) = (&workspace, &work);
+            scope.spawn(move |_| {
+                let mut space = workspace();
+                for (number, item) in items {
+                    if result_sender.send((number, work(&mut space, item))).is_err() {
+                        return;
+                    }
+                }
+            });
+        }
+        drop((items, result_sender));
+        let mut waiting = BTreeMap::new();
+        let (mut fed, mut taken, mut open) = (0, 0, true);
+        loop {
+            while open && fed - taken < limit as u64 {
+                match feed()? {
+                    Some(item) => {
+                        item_sender.send((fed, item)).expect("workers listen until the end");
+                        fed += 1;
+                    }
+                    None => open = false,
+                }
+            }
+            if taken == fed {
+                return Ok(());
+            }
+            let (number, result) = results.recv().expect("workers answer until all is taken");
+            waiting.insert(number, result);
+            while let Some(result) = waiting.remove(&taken) {
+                take(result?)?;
+                taken += 1;
+            }
+        }
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn pool(threads: usize) -> ThreadPool {
+        rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool")
+    }
+
+    #[test]
+    fn results_arrive_in_order_on_any_number_of_threads() {
+        for threads in [1, 2, 8] {
+            let mut next = 0_u64;
+            let mut out = Vec::new();
+            let result: Result<(), ()> = ordered(
+                &pool(threads),
+                || {
+                    next += 1;
+                    Ok((next <= 1000).then_some(next))
+                },
+                || 0_u64,
+                |count, item| {
+                    *count += 1;
+                    Ok(item * item)
+                },
+                |square| {
+                    out.push(square);
+                    Ok(())
+                },
+            );
+            assert_eq!(result, Ok(()));
+            assert_eq!(out, (1..=1000).map(|i| i * i).collect::<Vec<_>>());
+        }
+    }
+
+    #[test]
+    fn the_first_error_in_order_ends_the_run() {
+        let mut next = 0_u64;
+        let mut taken = 0;
+        let result: Result<(), u64> = ordered(
+            &pool(4),
+            || {
+                next += 1;
+                Ok(Some(next))
+            },
+            || (),
+            |(), item| if item >= 50 { Err(item) } else { Ok(item) },
+            |_| {
+                taken += 1;
+                Ok(())
+            },
+        );
+        assert_eq!(result, Err(50));
+        assert_eq!(taken, 49);
+    }
+}
