@@ -1,0 +1,261 @@
+//! The records of bricks: what lies in a brick file, as rkyv archives.
+//!
+//! Three kinds, one per stage that writes them: [`HitBrick`] (scan), [`SignBrick`] (sign),
+//! [`CellBrick`] (contour). All are validated before they are read; the store has checked their
+//! hash before that.
+//!
+//! Units: positions and plane offsets in lattice units from the brick's min corner.
+
+use rkyv::rancor::{BoxedError, Strategy};
+use rkyv::ser::Serializer;
+use rkyv::ser::allocator::ArenaHandle;
+use rkyv::ser::sharing::Share;
+use rkyv::util::AlignedVec;
+use rkyv::{Archive, Deserialize, Serialize};
+
+use crate::octree::edge_bits::AXIS_EDGES;
+
+/// Most hits that are kept of one edge: first, last, and one in between.
+pub const MAX_HITS: usize = 3;
+/// In [`Crossing::plane`]: no plane, the crossing belongs to a patch.
+pub const PATCH: u32 = 1 << 31;
+/// In [`Crossing::plane`]: a plane number that names none.
+pub const NO_PLANE: u32 = PATCH - 1;
+
+/// A record that is not what its kind demands.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum BrickError {
+    /// The archive does not validate.
+    #[error("Not a {kind} brick")]
+    Invalid {
+        /// Which kind was expected.
+        kind: &'static str,
+        /// What the validation found.
+        source: BoxedError,
+    },
+    /// A field is out of its range.
+    #[error("A {kind} brick has {field} {found}, the limit is {limit}")]
+    OutOfRange {
+        /// Which kind.
+        kind: &'static str,
+        /// Which field.
+        field: &'static str,
+        /// Its value.
+        found: u64,
+        /// The limit.
+        limit: u64,
+    },
+}
+
+/// The plane of a source triangle, with its origin. 32 bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
+pub struct SourcePlane {
+    /// `normal . p = offset` for points of the plane, lattice units from the brick's min corner.
+    pub offset: f64,
+    /// Unit normal from the original corners; zero when the triangle has none.
+    pub normal: [f32; 3],
+    /// Number of the source triangle.
+    pub source: u32,
+    /// Part number.
+    pub part: u32,
+    /// Material number and transparency bit.
+    pub material: u32,
+}
+
+/// An edge that was hit.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Archive, Serialize, Deserialize)]
+pub struct HitEdge {
+    /// Edge number (17 bits), count class (2 bits at 17), number of kept hits (2 bits at 19).
+    pub bits: u32,
+    /// Sum over all hits: +1 where the triangle faces up the axis, -1 where down; clamped.
+    pub signed_sum: i16,
+}
+
+impl HitEdge {
+    /// Packs an edge number, a count class and a number of kept hits.
+    #[must_use]
+    pub fn new(edge: u32, class: u32, kept: usize, signed_sum: i16) -> Self {
+        Self { bits: edge | class << 17 | (kept as u32) << 19, signed_sum }
+    }
+
+    /// The count class after one more hit. 0, 1, then 2 (even, more than none), 3 (odd, more than
+    /// one), 2, 3, ...: the low bit stays the exact parity.
+    #[must_use]
+    pub const fn next_class(class: u32) -> u32 {
+        match class {
+            0 => 1,
+            1 | 3 => 2,
+            _ => 3,
+        }
+    }
+
+    /// The edge number.
+    #[must_use]
+    pub const fn edge(self) -> u32 {
+        self.bits & 0x1_ffff
+    }
+
+    /// The count class.
+    #[must_use]
+    pub const fn class(self) -> u32 {
+        self.bits >> 17 & 3
+    }
+
+    /// How many hits are kept.
+    #[must_use]
+    pub const fn kept(self) -> usize {
+        (self.bits >> 19 & 3) as usize
+    }
+}
+
+/// What scan conversion leaves of a brick.
+#[derive(Clone, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
+pub struct HitBrick {
+    /// Edges with hits, by ascending edge number.
+    pub edges: Vec<HitEdge>,
+    /// Plane numbers of the kept hits, edge after edge, from the lower end of the edge up.
+    pub hits: Vec<u32>,
+    /// Planes of the triangles that hit, by ascending source number.
+    pub planes: Vec<SourcePlane>,
+}
+
+/// A marked edge after the signs are known.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Archive, Serialize, Deserialize)]
+pub struct Crossing {
+    /// The edge number.
+    pub edge: u32,
+    /// Plane number in the brick; or [`PATCH`] and the offset on the edge in 1/65536.
+    pub plane: u32,
+}
+
+/// What sign generation leaves of a brick.
+#[derive(Clone, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
+pub struct SignBrick {
+    /// Whether the brick's min corner is inside.
+    pub base_inside: bool,
+    /// Marked edges by ascending edge number; the signs of all corners follow from them.
+    pub crossings: Vec<Crossing>,
+    /// The planes that the crossings use.
+    pub planes: Vec<SourcePlane>,
+}
+
+/// What contouring leaves of a brick: its cells with their vertices.
+#[derive(Clone, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
+pub struct CellBrick {
+    /// Cell number x + 32y + 1024z (15 bits), corner mask (8 bits at 15), flipped face flag
+    /// (1 bit at 23); ascending.
+    pub cells: Vec<u32>,
+    /// Vertex positions, cell after cell, component after component.
+    pub positions: Vec<[i32; 3]>,
+    /// Offsets of the crossings on the cells' own edges (those that leave their min corner), in
+    /// 1/65536 of the edge, cell after cell, axis after axis.
+    pub offsets: Vec<u16>,
+}
+
+type BrickSerializer<'a> = Strategy<Serializer<AlignedVec, ArenaHandle<'a>, Share>, BoxedError>;
+
+/// The archive of a brick.
+pub fn encode<B>(brick: &B) -> AlignedVec
+where
+    B: for<'a> Serialize<BrickSerializer<'a>>,
+{
+    rkyv::to_bytes::<BoxedError>(brick).expect("plain vectors serialise")
+}
+
+fn out_of_range(kind: &'static str, field: &'static str, found: u64, limit: u64) -> BrickError {
+    BrickError::OutOfRange { kind, field, found, limit }
+}
+
+/// Validates a [`HitBrick`].
+///
+/// # Errors
+/// [`BrickError`] when the bytes are none.
+pub fn decode_hits(bytes: &[u8]) -> Result<&ArchivedHitBrick, BrickError> {
+    let kind = "hit";
+    let brick = rkyv::access::<ArchivedHitBrick, BoxedError>(bytes)
+        .map_err(|source| BrickError::Invalid { kind, source })?;
+    let mut kept = 0;
+    for edge in brick.edges.iter() {
+        let edge = HitEdge { bits: edge.bits.to_native(), signed_sum: 0 };
+        if edge.edge() >= 3 * AXIS_EDGES {
+            return Err(out_of_range(kind, "edge", edge.edge().into(), (3 * AXIS_EDGES).into()));
+        }
+        kept += edge.kept();
+    }
+    if kept != brick.hits.len() {
+        return Err(out_of_range(kind, "kept hits", kept as u64, brick.hits.len() as u64));
+    }
+    let planes = brick.planes.len() as u64;
+    match brick.hits.iter().find(|hit| u64::from(hit.to_native()) >= planes) {
+        Some(hit) => Err(out_of_range(kind, "plane", hit.to_native().into(), planes)),
+        None => Ok(brick),
+    }
+}
+
+/// Validates a [`SignBrick`].
+///
+/// # Errors
+/// [`BrickError`] when the bytes are none.
+pub fn decode_signs(bytes: &[u8]) -> Result<&ArchivedSignBrick, BrickError> {
+    let kind = "sign";
+    let brick = rkyv::access::<ArchivedSignBrick, BoxedError>(bytes)
+        .map_err(|source| BrickError::Invalid { kind, source })?;
+    let planes = brick.planes.len() as u64;
+    for crossing in brick.crossings.iter() {
+        let (edge, plane) = (crossing.edge.to_native(), crossing.plane.to_native());
+        if edge >= 3 * AXIS_EDGES {
+            return Err(out_of_range(kind, "edge", edge.into(), (3 * AXIS_EDGES).into()));
+        }
+        if plane & PATCH == 0 && u64::from(plane) >= planes {
+            return Err(out_of_range(kind, "plane", plane.into(), planes));
+        }
+    }
+    Ok(brick)
+}
+
+/// Validates a [`CellBrick`].
+///
+/// # Errors
+/// [`BrickError`] when the bytes are none.
+pub fn decode_cells(bytes: &[u8]) -> Result<&ArchivedCellBrick, BrickError> {
+    let kind = "cell";
+    let brick = rkyv::access::<ArchivedCellBrick, BoxedError>(bytes)
+        .map_err(|source| BrickError::Invalid { kind, source })?;
+    match brick.cells.iter().find(|cell| cell.to_native() >> 24 != 0) {
+        Some(cell) => Err(out_of_range(kind, "cell", cell.to_native().into(), 1 << 24)),
+        None => Ok(brick),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn counts_keep_their_parity_when_they_saturate() {
+        let mut class = 0;
+        for hits in 1..10 {
+            class = HitEdge::next_class(class);
+            assert_eq!(class & 1, hits & 1, "{hits} hits");
+            assert_eq!(class >> 1, u32::from(hits > 1), "{hits} hits");
+        }
+    }
+
+    #[test]
+    fn bricks_read_back_and_damaged_ones_are_refused() {
+        let brick = HitBrick {
+            edges: vec![HitEdge::new(5, 1, 1, -1), HitEdge::new(700, 3, 3, 1)],
+            hits: vec![0, 1, 0, 1],
+            planes: vec![SourcePlane::default(), SourcePlane { source: 9, ..Default::default() }],
+        };
+        let bytes = encode(&brick);
+        let back = decode_hits(&bytes).expect("our own bytes are valid");
+        assert_eq!(back.edges.len(), 2);
+        assert_eq!(back.planes[1].source.to_native(), 9);
+        let wrong = HitBrick { hits: vec![0, 1, 0, 2], ..brick };
+        let error = decode_hits(&encode(&wrong)).map(|_| ()).expect_err("plane 2 does not exist");
+        assert!(matches!(error, BrickError::OutOfRange { field: "plane", .. }));
+        assert!(decode_hits(&bytes[..bytes.len() - 8]).is_err());
+    }
+}

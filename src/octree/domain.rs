@@ -1,0 +1,234 @@
+//! The lattice: model coordinates to integers and back, exactly.
+//!
+//! One lattice of 2^28 units a side for all depths. Its unit is a power of two in model units and
+//! its origin a multiple of the unit, so that lattice points are exact in f64. A cell is a whole
+//! number of units, a multiple of 64. The grid is 2^depth cells; the model lies in its middle.
+//!
+//! Units: "units" are lattice units, "cells" are cell sides.
+
+use serde::{Deserialize, Serialize};
+
+use crate::octree::SIDE;
+
+/// Bits of a lattice coordinate.
+pub const LATTICE_BITS: u32 = 28;
+
+/// Cells are multiples of this many units.
+const CELL_MULTIPLE: u64 = 64;
+/// Largest share of the grid that the model's longest side takes.
+const MAX_FILL: f64 = 0.9;
+/// Cells kept free on both sides together.
+const MARGIN_CELLS: f64 = 4.0;
+/// A unit is never smaller than 2 to this power: coordinates far below are denormal noise.
+const MIN_UNIT_EXPONENT: i32 = -960;
+
+/// An axis-parallel box in model units, finite.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SnapBox {
+    /// Smallest coordinates.
+    pub lo: [f64; 3],
+    /// Largest coordinates.
+    pub hi: [f64; 3],
+}
+
+impl SnapBox {
+    /// A box that holds nothing yet.
+    pub const EMPTY: Self = Self { lo: [f64::INFINITY; 3], hi: [f64::NEG_INFINITY; 3] };
+
+    /// Grows the box to hold `point`.
+    pub fn add(&mut self, point: [f64; 3]) {
+        self.lo = std::array::from_fn(|a| self.lo[a].min(point[a]));
+        self.hi = std::array::from_fn(|a| self.hi[a].max(point[a]));
+    }
+
+    /// Half of the longest side; halves cannot overflow.
+    fn half_longest(&self) -> f64 {
+        (0..3).map(|a| self.hi[a] * 0.5 - self.lo[a] * 0.5).fold(0.0, f64::max)
+    }
+
+    /// The diagonal, model units; infinite when it overflows.
+    #[must_use]
+    pub fn diagonal(&self) -> f64 {
+        let longest = self.half_longest();
+        if longest == 0.0 {
+            return 0.0;
+        }
+        let sum: f64 = (0..3)
+            .map(|a| (self.hi[a] * 0.5 - self.lo[a] * 0.5) / longest)
+            .map(|share| share * share)
+            .sum();
+        longest * sum.sqrt() * 2.0
+    }
+
+    /// The longest side, model units; infinite when it overflows.
+    #[must_use]
+    pub fn longest(&self) -> f64 {
+        self.half_longest() * 2.0
+    }
+}
+
+/// The map between model units, lattice units, cells and bricks.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Domain {
+    /// The octree's depth: the grid has 2^depth cells a side.
+    pub depth: u32,
+    /// The lattice unit is 2 to this power, in model units.
+    pub unit_exponent: i32,
+    /// The lattice point (0, 0, 0) in multiples of the unit.
+    pub origin_units: [i64; 3],
+    /// Side of a cell in lattice units.
+    pub cell_units: u32,
+}
+
+impl Domain {
+    /// The domain at `depth` (4 to 15) around the finite, non-empty box of the model.
+    #[must_use]
+    pub fn around(model: &SnapBox, depth: u32) -> Self {
+        assert!((4..=15).contains(&depth), "depth {depth} is outside of 4..=15");
+        let cells = f64::from(1_u32 << depth);
+        let fill_cells = (MAX_FILL * cells).min(cells - MARGIN_CELLS);
+        let half_longest = model.half_longest();
+        let farthest = (0..3).map(|a| model.lo[a].abs().max(model.hi[a].abs())).fold(0.0, f64::max);
+        // No finer than the spacing of f64 at the farthest coordinate: then origins are exact.
+        let mut exponent = (exponent_of(farthest) - 52).max(MIN_UNIT_EXPONENT);
+        let fine = exponent_of(half_longest) + 1 - LATTICE_BITS as i32;
+        exponent = exponent.max(fine);
+        loop {
+            let units = scale(half_longest, -exponent) * 2.0;
+            let cell = ((units / fill_cells).ceil() as u64).max(1).next_multiple_of(CELL_MULTIPLE);
+            if cell << depth <= 1 << LATTICE_BITS {
+                let centre = |a: usize| {
+                    let middle = model.lo[a] * 0.5 + model.hi[a] * 0.5;
+                    scale(middle, -exponent).floor() as i64 - ((cell << depth) / 2) as i64
+                };
+                return Self {
+                    depth,
+                    unit_exponent: exponent,
+                    origin_units: [centre(0), centre(1), centre(2)],
+                    cell_units: cell as u32,
+                };
+            }
+            exponent += 1;
+        }
+    }
+
+    /// The cell's side in model units.
+    #[must_use]
+    pub fn cell_size(&self) -> f64 {
+        scale(f64::from(self.cell_units), self.unit_exponent)
+    }
+
+    /// The side of a brick in lattice units.
+    #[must_use]
+    pub fn brick_units(&self) -> i64 {
+        i64::from(self.cell_units) * SIDE as i64
+    }
+
+    /// Bricks along one side of the grid.
+    #[must_use]
+    pub fn bricks_per_side(&self) -> u32 {
+        (1_u32 << self.depth).div_ceil(SIDE as u32)
+    }
+
+    /// The nearest lattice point to a point of the model's box.
+    #[must_use]
+    #[inline]
+    pub fn snap(&self, point: [f64; 3]) -> [i32; 3] {
+        let to_units = power_of_two(-self.unit_exponent);
+        std::array::from_fn(|a| {
+            ((point[a] * to_units).round() as i64 - self.origin_units[a]) as i32
+        })
+    }
+
+    /// A point in lattice units without rounding to the lattice (up to the last bit of f64).
+    #[must_use]
+    #[inline]
+    pub fn to_units(&self, point: [f64; 3]) -> [f64; 3] {
+        let to_units = power_of_two(-self.unit_exponent);
+        std::array::from_fn(|a| point[a] * to_units - self.origin_units[a] as f64)
+    }
+
+    /// The model coordinates of a lattice point. Exact.
+    #[must_use]
+    #[inline]
+    pub fn to_model(&self, point: [i64; 3]) -> [f64; 3] {
+        let unit = power_of_two(self.unit_exponent);
+        std::array::from_fn(|a| (self.origin_units[a] + point[a]) as f64 * unit)
+    }
+}
+
+/// The exponent e with 2^e <= x < 2^(e+1); very small for zero and denormals.
+fn exponent_of(x: f64) -> i32 {
+    (x.to_bits() >> 52 & 0x7ff) as i32 - 1023
+}
+
+/// 2^exponent for exponents of normal numbers.
+fn power_of_two(exponent: i32) -> f64 {
+    f64::from_bits(((exponent + 1023) as u64) << 52)
+}
+
+/// x times 2^exponent.
+fn scale(x: f64, exponent: i32) -> f64 {
+    x * power_of_two(exponent)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn check(model: SnapBox, depth: u32) {
+        let domain = Domain::around(&model, depth);
+        let side = i64::from(domain.cell_units) << depth;
+        assert!(side <= 1 << LATTICE_BITS);
+        assert_eq!(u64::from(domain.cell_units) % CELL_MULTIPLE, 0);
+        for corner in [model.lo, model.hi] {
+            let snapped = domain.snap(corner).map(i64::from);
+            for (a, &q) in snapped.iter().enumerate() {
+                let margin = 3 * i64::from(domain.cell_units) / 2;
+                assert!(q >= margin && q <= side - margin, "{q} of {side}, {model:?}");
+                let back = domain.to_model(snapped)[a];
+                assert!((back - corner[a]).abs() <= power_of_two(domain.unit_exponent) * 0.5);
+            }
+        }
+    }
+
+    #[test]
+    fn models_far_from_the_origin_and_of_any_size_keep_their_shape() {
+        for (at, size) in
+            [(0.0, 1.0), (1e6, 1.0), (-1e6, 1e-3), (0.0, 1e-6), (1e9, 1e5), (3.0, 1e300)]
+        {
+            for depth in [4, 8, 13, 15] {
+                check(SnapBox { lo: [at; 3], hi: [at + size, at + size / 2.0, at] }, depth);
+            }
+        }
+        check(SnapBox { lo: [-1e308; 3], hi: [1e308; 3] }, 8);
+        check(SnapBox { lo: [5.0; 3], hi: [5.0; 3] }, 8);
+        check(SnapBox { lo: [0.0; 3], hi: [1e-310; 3] }, 8);
+    }
+
+    #[test]
+    fn single_precision_models_lie_on_the_lattice_unmoved() {
+        let model = SnapBox { lo: [0.0; 3], hi: [f64::from(1.7_f32); 3] };
+        let domain = Domain::around(&model, 9);
+        for i in 0..100 {
+            let x = f64::from(0.017_f32 * i as f32);
+            if x >= 0.25 {
+                assert_eq!(domain.to_model(domain.snap([x; 3]).map(i64::from)), [x; 3]);
+            }
+        }
+    }
+
+    proptest! {
+        #[test]
+        fn the_model_fills_about_half_of_the_grid_or_more(
+            at in -1e4..1e4_f64, size in 1e-3..1e3_f64, depth in 4..14_u32,
+        ) {
+            let model = SnapBox { lo: [at; 3], hi: [at + size; 3] };
+            check(model, depth);
+            let domain = Domain::around(&model, depth);
+            let share = size / (domain.cell_size() * f64::from(1_u32 << depth));
+            prop_assert!(share > 0.7, "{share}");
+        }
+    }
+}

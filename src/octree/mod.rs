@@ -1,0 +1,24 @@
+//! What the bytes of the store mean: the lattice, bricks of cells, and the tree above them.
+//!
+//! Nothing here knows where bytes lie; nothing here knows a file format or a stage.
+
+mod brick;
+mod domain;
+mod edge_bits;
+mod index;
+mod key;
+mod region;
+mod triangle;
+
+pub use brick::{
+    BrickError, CellBrick, Crossing, HitBrick, HitEdge, MAX_HITS, NO_PLANE, PATCH, SignBrick,
+    SourcePlane, decode_cells, decode_hits, decode_signs, encode,
+};
+pub use domain::{Domain, LATTICE_BITS, SnapBox};
+pub use edge_bits::{
+    AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,
+};
+pub use index::{BrickIndex, Neighbour};
+pub use key::BrickKey;
+pub use region::{FaceRegions, Regions, find_regions};
+pub use triangle::{BinTriangle, SoupTriangle, TRANSPARENT};

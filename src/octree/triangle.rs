@@ -1,0 +1,41 @@
+//! Triangles as the stages pass them on disk.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::store::Record;
+
+/// Set in [`SoupTriangle::material`] when light passes the material.
+pub const TRANSPARENT: u32 = 1 << 31;
+
+/// A triangle of the soup, as spooled by ingest. 88 bytes; see docs/format.md.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct SoupTriangle {
+    /// Finite corners as read, model units.
+    pub corners: [[f64; 3]; 3],
+    /// Number of the triangle in the input, counted over all that were delivered.
+    pub source: u32,
+    /// Part number.
+    pub part: u32,
+    /// Material number, and [`TRANSPARENT`].
+    pub material: u32,
+    /// Reserved for bridges and fills; zero.
+    pub tags: u32,
+}
+
+/// A triangle in the bin of a brick that it touches. 96 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct BinTriangle {
+    /// Key of the brick.
+    pub brick: u64,
+    /// The triangle.
+    pub triangle: SoupTriangle,
+}
+
+impl Record for BinTriangle {
+    type Key = (u64, u32);
+    fn key(&self) -> (u64, u32) {
+        (self.brick, self.triangle.source)
+    }
+}
