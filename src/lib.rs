@@ -17,7 +17,11 @@
 //! invariants.
 
 pub mod geom;
+pub mod ingest;
 pub mod mesh;
 pub mod monitor;
 pub mod octree;
+pub mod patch;
+pub mod scan;
+pub mod sign;
 pub mod store;

@@ -63,6 +63,18 @@ pub struct SourcePlane {
     pub material: u32,
 }
 
+impl From<&ArchivedSourcePlane> for SourcePlane {
+    fn from(archived: &ArchivedSourcePlane) -> Self {
+        Self {
+            offset: archived.offset.to_native(),
+            normal: [0, 1, 2].map(|a| archived.normal[a].to_native()),
+            source: archived.source.to_native(),
+            part: archived.part.to_native(),
+            material: archived.material.to_native(),
+        }
+    }
+}
+
 /// An edge that was hit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Archive, Serialize, Deserialize)]
 pub struct HitEdge {

@@ -7,12 +7,14 @@ mod domain;
 mod edge_bits;
 mod index;
 mod key;
+mod plane;
 mod region;
 mod triangle;
 
 pub use brick::{
-    BrickError, CellBrick, Crossing, HitBrick, HitEdge, MAX_HITS, NO_PLANE, PATCH, SignBrick,
-    SourcePlane, decode_cells, decode_hits, decode_signs, encode,
+    ArchivedCellBrick, ArchivedHitBrick, ArchivedSignBrick, BrickError, CellBrick, Crossing,
+    HitBrick, HitEdge, MAX_HITS, NO_PLANE, PATCH, SignBrick, SourcePlane, decode_cells,
+    decode_hits, decode_signs, encode,
 };
 pub use domain::{Domain, LATTICE_BITS, SnapBox};
 pub use edge_bits::{
@@ -20,5 +22,6 @@ pub use edge_bits::{
 };
 pub use index::{BrickIndex, Neighbour};
 pub use key::BrickKey;
+pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
 pub use triangle::{BinTriangle, SoupTriangle, TRANSPARENT};

@@ -1,6 +1,6 @@
 //! Read, work, write: items in order through a pool of workers, with back-pressure.
 //!
-//! Memory: at most four items per worker are under way; feeding waits until the oldest is taken.
+//! Memory: at most two items per worker are under way; feeding waits until the oldest is taken.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crossbeam::channel::bounded;
 use rayon::ThreadPool;
 
 /// Items under way per worker.
-const ITEMS_PER_WORKER: usize = 4;
+const ITEMS_PER_WORKER: usize = 2;
 
 /// Feeds items to `work` on the threads of `pool` and hands the results to `take` in feeding order.
 ///
