@@ -5,6 +5,7 @@
 mod brick;
 mod domain;
 mod edge_bits;
+mod flips;
 mod index;
 mod key;
 mod plane;
@@ -20,6 +21,7 @@ pub use domain::{Domain, LATTICE_BITS, SnapBox};
 pub use edge_bits::{
     AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,
 };
+pub use flips::{FLIPS, Flip, FlipReader, FlipRecord, Flips};
 pub use index::{BrickIndex, Neighbour};
 pub use key::BrickKey;
 pub use plane::clamp_to_edge;

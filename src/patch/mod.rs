@@ -11,20 +11,18 @@
 //!             no cycle is traced, a set of odd faces is cut and paired plane by plane.
 
 mod faces;
-mod flips;
 mod pair;
 mod path;
 mod solve;
 
 use serde::{Deserialize, Serialize};
 
-use crate::octree::{BrickError, BrickKey, EdgeBits, decode_hits};
+use crate::octree::{BrickError, BrickKey, EdgeBits, FlipRecord, Flips, decode_hits};
 use crate::patch::faces::{ComponentFace, LocalComponents, find_components};
 use crate::patch::solve::Solver;
 use crate::store::{BrickFile, Resources, Sorter, StoreError, Unite, ordered};
 
 pub use faces::OddFace;
-pub use flips::{FLIPS, FlipReader, FlipRecord, Flips};
 
 /// What can go wrong while patching.
 #[derive(Debug, thiserror::Error)]

@@ -9,9 +9,9 @@
 //! Memory: one bucket of faces per level and axis, each an external sort; resident is one cut.
 //! Source: Ju 2004, section 4.2; time-forward processing after Chiang et al. 1995.
 
+use crate::octree::Flip;
 use crate::patch::Opening;
 use crate::patch::faces::OddFace;
-use crate::patch::flips::Flip;
 use crate::patch::pair::{Place, pair};
 use crate::patch::path::{SUB, Step, walk};
 use crate::store::{Record, Scratch, Sorted, Sorter, StoreError};

@@ -2,7 +2,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::octree::{BrickKey, SIDE, edge_index};
+use crate::octree::edge_bits::{SIDE, edge_index, edge_position};
+use crate::octree::key::BrickKey;
 use crate::store::{
     Record, Resources, Sorted, Sorter, Spool, SpoolReader, SpoolWriter, StoreError,
 };
@@ -85,7 +86,7 @@ impl Flips {
             let next = sorted_group(&mut sorted, &mut last)?;
             let Some((record, count)) = next else { break };
             if count % 2 == 1 {
-                let (_, at) = crate::octree::edge_position(record.edge);
+                let (_, at) = edge_position(record.edge);
                 owned += u64::from(at.iter().all(|&c| c < SIDE));
                 writer.push(record)?;
             }

@@ -1,0 +1,280 @@
+//! The region graph: regions of all bricks, united across brick borders and through empty space.
+//!
+//! A region is a set of corners joined by edges that no hit and no patch crosses. A second union,
+//! in which even hits do not count, tells which volumes only the resolution seals.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::octree::{
+    BrickIndex, BrickKey, FaceRegions, Flips, Neighbour, Regions, edge_position, find_regions,
+};
+use crate::sign::SignError;
+use crate::sign::load::{LoadItems, Loaded};
+use crate::store::{
+    BrickFile, Labels, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite, ordered,
+};
+
+/// A brick of the graph. 16 bytes.
+#[derive(Clone, Copy, Debug)]
+pub struct GraphBrick {
+    /// Its key.
+    pub key: u64,
+    /// Number of its first region.
+    pub first_region: u32,
+    /// How many regions it has.
+    pub regions: u16,
+    /// Whether an odd number of marks lies on the x line through its min corner.
+    pub odd_first_line: bool,
+}
+
+/// A piece of a face between two bricks, as one of them sees it.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct FacePiece {
+    /// Key of the upper brick.
+    upper: u64,
+    /// Normal of the face.
+    axis: u32,
+    /// Number of the piece on the face.
+    piece: u32,
+    /// 1 when the upper brick says so, 0 when the lower does.
+    side: u32,
+    /// The region there.
+    region: u32,
+}
+
+impl Record for FacePiece {
+    type Key = (u64, u32, u32, u32);
+    fn key(&self) -> Self::Key {
+        (self.upper, self.axis, self.piece, self.side)
+    }
+}
+
+/// Regions of all bricks and what joins them.
+pub struct RegionGraph {
+    /// The bricks in Morton order.
+    pub bricks: Vec<GraphBrick>,
+    pieces: Sorter<FacePiece>,
+    /// Pairs of regions joined by an edge with even hits.
+    even: Option<Spool<[u32; 2]>>,
+    regions: u64,
+}
+
+/// Whether a region is reached from outside.
+pub struct Exterior {
+    strict: Labels,
+    strict_outside: u32,
+    loose: Labels,
+    loose_outside: u32,
+}
+
+impl Exterior {
+    /// Reached past no hit at all.
+    pub fn reaches(&mut self, region: u32) -> Result<bool, StoreError> {
+        Ok(self.strict.label(region)? == self.strict_outside)
+    }
+
+    /// Reached past edges with an even number of hits.
+    pub fn reaches_past_even(&mut self, region: u32) -> Result<bool, StoreError> {
+        Ok(self.loose.label(region)? == self.loose_outside)
+    }
+}
+
+/// What one brick says.
+struct BrickSays {
+    brick: BrickKey,
+    regions: u16,
+    odd_first_line: bool,
+    sides: [FaceRegions; 6],
+    even: Vec<[u16; 2]>,
+}
+
+/// Finds the regions of all bricks.
+pub fn build_graph(
+    hits: &BrickFile,
+    flips: &Flips,
+    resources: &Resources,
+) -> Result<RegionGraph, SignError> {
+    let mut items = LoadItems::new(hits, flips, resources);
+    let mut bricks = Vec::with_capacity(hits.len());
+    let mut pieces = Sorter::<FacePiece>::new(resources.scratch, resources.share_bytes / 4);
+    let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, "even.spool")?;
+    let mut regions = 0_u64;
+    ordered(
+        resources.pool,
+        || Ok(items.next()?),
+        Loaded::default,
+        |loaded, item| {
+            loaded.load(hits, &item)?;
+            Ok(examine(loaded, item.brick))
+        },
+        |says: BrickSays| {
+            let base = u32::try_from(regions + u64::from(says.regions))
+                .map_err(|_| StoreError::TooMany { what: "Regions", limit: u64::from(u32::MAX) })?
+                - u32::from(says.regions);
+            for pair in &says.even {
+                even.push(pair.map(|region| base + u32::from(region)))?;
+            }
+            push_sides(&says, base, &mut pieces)?;
+            bricks.push(GraphBrick {
+                key: says.brick.0,
+                first_region: base,
+                regions: says.regions,
+                odd_first_line: says.odd_first_line,
+            });
+            regions += u64::from(says.regions);
+            resources.monitor.advance(1);
+            Ok::<(), SignError>(())
+        },
+    )?;
+    let even = Some(even.finish()?);
+    Ok(RegionGraph { bricks, pieces, even, regions })
+}
+
+fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
+    let regions = find_regions(&loaded.barrier);
+    let sides =
+        std::array::from_fn(|side| regions.on_side(&loaded.barrier, side / 2, side % 2 == 1));
+    BrickSays {
+        brick,
+        regions: regions.count,
+        odd_first_line: loaded.marks.rows(0)[0].count_ones() % 2 == 1,
+        sides,
+        even: even_pairs(loaded, &regions),
+    }
+}
+
+/// Pairs of regions on both sides of an edge that is a barrier and not marked.
+fn even_pairs(loaded: &Loaded, regions: &Regions) -> Vec<[u16; 2]> {
+    let mut pairs = Vec::new();
+    loaded.barrier.for_each(|edge| {
+        if !loaded.marks.get(edge) {
+            let (axis, at) = edge_position(edge);
+            let mut beyond = at;
+            beyond[axis] += 1;
+            let (a, b) = (regions.at(at), regions.at(beyond));
+            if a != b {
+                pairs.push([a.min(b), a.max(b)]);
+            }
+        }
+    });
+    pairs.sort_unstable();
+    pairs.dedup();
+    pairs
+}
+
+fn push_sides(
+    says: &BrickSays,
+    base: u32,
+    pieces: &mut Sorter<FacePiece>,
+) -> Result<(), StoreError> {
+    for (side, regions) in says.sides.iter().enumerate() {
+        let (axis, high) = (side / 2, side % 2 == 1);
+        let upper = if high { says.brick.upper(axis) } else { says.brick };
+        for (piece, &region) in regions.iter().enumerate() {
+            pieces.push(FacePiece {
+                upper: upper.0,
+                axis: axis as u32,
+                piece: piece as u32,
+                side: u32::from(!high),
+                region: base + u32::from(region),
+            })?;
+        }
+    }
+    Ok(())
+}
+
+impl RegionGraph {
+    /// The number of regions.
+    pub fn region_count(&self) -> u64 {
+        self.regions
+    }
+
+    /// Unites all and finds what the outside reaches.
+    pub fn flood(
+        &mut self,
+        index: &BrickIndex,
+        resources: &Resources,
+    ) -> Result<Exterior, SignError> {
+        let outside = self.regions + index.empty_count() as u64;
+        let share = resources.share_bytes / 4;
+        let mut strict = Unite::new(resources.scratch, share, outside + 1)?;
+        let mut loose = Unite::new(resources.scratch, share, outside + 1)?;
+        let outside = outside as u32;
+        let first_empty = self.regions as u32;
+        let mut join = |a: u32, b: u32| -> Result<(), StoreError> {
+            strict.unite(a, b)?;
+            loose.unite(a, b)
+        };
+        let none = Sorter::new(resources.scratch, 0);
+        let pieces = std::mem::replace(&mut self.pieces, none);
+        join_pieces(pieces, index, first_empty, outside, &mut join)?;
+        index.for_each_empty_contact(|empty, other| {
+            let other = other.map_or(outside, |other| first_empty + other as u32);
+            join(first_empty + empty as u32, other)
+        })?;
+        if let Some(even) = self.even.take() {
+            let mut reader = even.reader(0, even.len());
+            while let Some(block) = reader.next_block()? {
+                block.iter().try_for_each(|&[a, b]| loose.unite(a, b))?;
+            }
+        }
+        let (mut strict, mut loose) = (strict.finish()?, loose.finish()?);
+        let strict_outside = strict.label(outside)?;
+        let loose_outside = loose.label(outside)?;
+        Ok(Exterior { strict, strict_outside, loose, loose_outside })
+    }
+}
+
+/// Joins what the two sides of every face say, or one side and the empty space beyond.
+fn join_pieces(
+    pieces: Sorter<FacePiece>,
+    index: &BrickIndex,
+    first_empty: u32,
+    outside: u32,
+    join: &mut impl FnMut(u32, u32) -> Result<(), StoreError>,
+) -> Result<(), SignError> {
+    let mut sorted = pieces.finish()?;
+    let mut waiting: Option<FacePiece> = None;
+    loop {
+        let next = sorted.next()?;
+        if let Some(first) = waiting.take() {
+            let same = |other: &FacePiece| {
+                (other.upper, other.axis, other.piece) == (first.upper, first.axis, first.piece)
+            };
+            match next {
+                Some(second) if same(&second) => {
+                    join(first.region, second.region)?;
+                    continue;
+                }
+                _ => join(first.region, beyond(&first, index, first_empty, outside)?)?,
+            }
+        }
+        if next.is_none() {
+            return Ok(());
+        }
+        waiting = next;
+    }
+}
+
+/// The empty space on the side of a face from which no brick spoke.
+fn beyond(
+    piece: &FacePiece,
+    index: &BrickIndex,
+    first_empty: u32,
+    outside: u32,
+) -> Result<u32, SignError> {
+    let mut position = BrickKey(piece.upper).position();
+    if piece.side == 1 {
+        let axis = piece.axis as usize;
+        position[axis] = position[axis].wrapping_sub(1);
+    }
+    match index.locate(position) {
+        Neighbour::Empty(number) => Ok(first_empty + number as u32),
+        Neighbour::Outside => Ok(outside),
+        Neighbour::Brick(_) => Err(SignError::Contradiction {
+            brick: position,
+            expected: "both bricks at a face to find the same pieces of it",
+        }),
+    }
+}

@@ -1,0 +1,130 @@
+//! Decides what is inside: a sign at every corner, and one crossing on every marked edge.
+//!
+//! In:         the brick file of scan, and the flips of patch.
+//! Out:        a brick file of [`SignBrick`]s, one per brick with a marked edge.
+//! Invariant:  signs are a function of the grid's corners, marks are their differences, so the
+//!             result is closed whatever the hits were; the border of the grid is outside.
+//! Units:      cells; corners are counted as cells.
+//! Memory:     the share for unions and sorts, 24 bytes a brick for the index.
+//! Fails:      [`SignError`]: the scratch disk, or bricks that contradict each other.
+//! Source:     Ju 2004, section 5 (sign generation); the region graph and its barrier are ours.
+
+mod graph;
+mod load;
+mod parity;
+mod relabel;
+
+use serde::{Deserialize, Serialize};
+
+use crate::monitor::Monitor;
+use crate::octree::{BrickError, BrickIndex, Domain, Flips};
+use crate::sign::graph::{RegionGraph, build_graph};
+use crate::sign::parity::base_parities;
+use crate::sign::relabel::relabel;
+use crate::store::{BrickFile, Resources, StoreError};
+
+/// Name of the brick file that sign generation leaves.
+pub const SIGNS: &str = "signs.bricks";
+
+/// What can go wrong while signs are decided.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum SignError {
+    /// The scratch disk fails.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A brick's record is not what its stage writes.
+    #[error(transparent)]
+    Brick(#[from] BrickError),
+    /// Two stages contradict each other: a bug, or a disk that lies.
+    #[error("Brick {brick:?}: expected {expected}, found otherwise")]
+    Contradiction {
+        /// Position of the brick.
+        brick: [u32; 3],
+        /// What holds for every sound set of bricks.
+        expected: &'static str,
+    },
+}
+
+/// What counts as inside.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FillRule {
+    /// All that the exterior cannot reach past any hit.
+    #[default]
+    Solid,
+    /// Ju's parity: inside after an odd number of walls.
+    Evenodd,
+}
+
+/// Counts of sign generation. Volumes are in cells.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct SignStats {
+    /// Bricks with a marked edge.
+    pub bricks: u64,
+    /// Regions of all bricks.
+    pub regions: u64,
+    /// Corners inside, in the bricks that were looked at.
+    pub inside_corners: u64,
+    /// Marked edges: the polygons of the result.
+    pub crossings: u64,
+    /// Of these, crossed by a patch and by no triangle.
+    pub patch_crossings: u64,
+    /// Cells with corners on both sides: the leaves.
+    pub leaf_cells: u64,
+    /// Inside although parity says outside: overlaps, cavities and sealed parts.
+    pub filled_cells: u64,
+    /// Of these, open to the outside but for walls closer than a cell.
+    pub sealed_by_resolution_cells: u64,
+    /// Edges with hits whose both ends are outside: features thinner than a cell.
+    pub thin_edges: u64,
+    /// Edges with hits whose both ends are inside: surface hidden in the solid.
+    pub buried_edges: u64,
+}
+
+impl SignStats {
+    fn add(&mut self, other: &Self) {
+        self.bricks += other.bricks;
+        self.inside_corners += other.inside_corners;
+        self.crossings += other.crossings;
+        self.patch_crossings += other.patch_crossings;
+        self.leaf_cells += other.leaf_cells;
+        self.filled_cells += other.filled_cells;
+        self.sealed_by_resolution_cells += other.sealed_by_resolution_cells;
+        self.thin_edges += other.thin_edges;
+        self.buried_edges += other.buried_edges;
+    }
+}
+
+/// Decides all signs.
+///
+/// # Errors
+/// [`SignError`].
+pub fn assign_signs(
+    hits: &BrickFile,
+    flips: &Flips,
+    rule: FillRule,
+    domain: &Domain,
+    resources: &Resources,
+) -> Result<(BrickFile, SignStats), SignError> {
+    let mut graph = build_graph(hits, flips, resources)?;
+    let keys = graph.bricks.iter().map(|brick| brick.key).collect();
+    let index = BrickIndex::new(keys, domain.bricks_per_side());
+    let parities = base_parities(&graph.bricks);
+    let exterior = graph.flood(&index, resources)?;
+    let regions = graph.region_count();
+    let RegionGraph { bricks, .. } = graph;
+    let (file, mut stats) = relabel(hits, flips, rule, &bricks, &parities, exterior, resources)?;
+    stats.regions = regions;
+    note_fill(&stats, resources.monitor);
+    Ok((file, stats))
+}
+
+fn note_fill(stats: &SignStats, monitor: &dyn Monitor) {
+    if stats.sealed_by_resolution_cells > 0 {
+        monitor.note(&format!(
+            "{} cells were filled because walls closer than a cell seal them",
+            stats.sealed_by_resolution_cells
+        ));
+    }
+}

@@ -1,0 +1,268 @@
+//! Turns regions into signs and marks, and picks the crossing of every marked edge.
+
+use crate::octree::{
+    ArchivedHitBrick, CornerBits, Crossing, EdgeBits, FlipRecord, Flips, HitEdge, LINES, NO_PLANE,
+    PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_hits, edge_position, encode,
+    find_regions,
+};
+use crate::sign::graph::{Exterior, GraphBrick};
+use crate::sign::load::{LoadItem, LoadItems, Loaded};
+use crate::sign::{FillRule, SIGNS, SignError, SignStats};
+use crate::store::{BrickFile, BrickWriter, Resources, ordered};
+
+/// What the flood says of a region.
+#[derive(Clone, Copy)]
+struct Verdict {
+    exterior: bool,
+    sealed_by_resolution: bool,
+}
+
+struct RelabelItem {
+    load: LoadItem,
+    base_parity: bool,
+    verdicts: Vec<Verdict>,
+}
+
+struct Relabelled {
+    key: u64,
+    bytes: rkyv::util::AlignedVec,
+    stats: SignStats,
+}
+
+/// Writes the signs of all bricks.
+pub fn relabel(
+    hits: &BrickFile,
+    flips: &Flips,
+    rule: FillRule,
+    bricks: &[GraphBrick],
+    parities: &[bool],
+    mut exterior: Exterior,
+    resources: &Resources,
+) -> Result<(BrickFile, SignStats), SignError> {
+    let mut writer = BrickWriter::create(resources.scratch, SIGNS, resources.backing)?;
+    let mut stats = SignStats::default();
+    let mut items = LoadItems::new(hits, flips, resources);
+    let mut number = 0;
+    ordered(
+        resources.pool,
+        || {
+            let Some(load) = items.next()? else { return Ok(None) };
+            let brick = &bricks[number];
+            let base_parity = parities[number];
+            number += 1;
+            let first = brick.first_region;
+            let verdicts = (first..first + u32::from(brick.regions))
+                .map(|region| {
+                    let exterior_here = exterior.reaches(region)?;
+                    let loose = exterior.reaches_past_even(region)?;
+                    let sealed_by_resolution = loose && !exterior_here;
+                    Ok(Verdict { exterior: exterior_here, sealed_by_resolution })
+                })
+                .collect::<Result<_, SignError>>()?;
+            Ok(Some(RelabelItem { load, base_parity, verdicts }))
+        },
+        Workspace::default,
+        |space, item| space.relabel(hits, &item, rule),
+        |done: Relabelled| {
+            stats.add(&done.stats);
+            resources.monitor.advance(1);
+            if done.stats.bricks == 0 {
+                return Ok(());
+            }
+            Ok::<(), SignError>(writer.append(done.key, 0, &done.bytes)?)
+        },
+    )?;
+    Ok((writer.finish(resources.cached_windows)?, stats))
+}
+
+#[derive(Default)]
+struct Workspace {
+    loaded: Loaded,
+    parity: CornerBits,
+    signs: CornerBits,
+    sealed: CornerBits,
+    marks: EdgeBits,
+}
+
+impl Workspace {
+    fn relabel(
+        &mut self,
+        hits: &BrickFile,
+        item: &RelabelItem,
+        rule: FillRule,
+    ) -> Result<Relabelled, SignError> {
+        let view = self.loaded.load(hits, &item.load)?;
+        let record = view.as_ref().map(|view| decode_hits(view)).transpose()?;
+        let regions = find_regions(&self.loaded.barrier);
+        if usize::from(regions.count) != item.verdicts.len() {
+            return Err(contradiction(item, "as many regions as before"));
+        }
+        self.parity.from_marks(&self.loaded.marks, item.base_parity);
+        self.set_signs(&regions, item, rule)?;
+        self.marks.set_differences(&self.signs);
+        let mut stats = self.count();
+        let brick = self.pick_crossings(record, &item.load.flips, &mut stats);
+        stats.bricks = u64::from(!brick.crossings.is_empty());
+        let bytes = encode(&brick);
+        Ok(Relabelled { key: item.load.brick.0, bytes, stats })
+    }
+
+    /// Signs by the fill rule. What parity calls inside, the exterior never reaches: checked.
+    fn set_signs(
+        &mut self,
+        regions: &Regions,
+        item: &RelabelItem,
+        rule: FillRule,
+    ) -> Result<(), SignError> {
+        for row in 0..ROWS {
+            let (mut inside, mut sealed) = (0, 0);
+            for (bits, region) in regions.row(row) {
+                let verdict = item.verdicts[usize::from(region)];
+                inside |= if verdict.exterior { 0 } else { bits };
+                sealed |= if verdict.sealed_by_resolution { bits } else { 0 };
+            }
+            let parity = self.parity.rows[row];
+            if parity & !inside != 0 {
+                return Err(contradiction(item, "parity inside to be out of the exterior's reach"));
+            }
+            self.signs.rows[row] = if rule == FillRule::Solid { inside } else { parity };
+            self.sealed.rows[row] = sealed;
+        }
+        Ok(())
+    }
+
+    /// Counts corners that the brick owns, and leaf cells.
+    fn count(&self) -> SignStats {
+        let mut stats = SignStats::default();
+        let own = (1_u64 << SIDE) - 1;
+        for z in 0..SIDE {
+            for y in 0..SIDE {
+                let row = z * LINES + y;
+                let (signs, parity) = (self.signs.rows[row], self.parity.rows[row]);
+                let filled = signs & !parity & own;
+                stats.inside_corners += u64::from((signs & own).count_ones());
+                stats.filled_cells += u64::from(filled.count_ones());
+                let sealed = filled & self.sealed.rows[row];
+                stats.sealed_by_resolution_cells += u64::from(sealed.count_ones());
+                stats.leaf_cells += u64::from(self.marks.cells_touched(z, y).count_ones());
+            }
+        }
+        stats
+    }
+
+    /// One crossing for every marked edge: the one nearest to the outside.
+    fn pick_crossings(
+        &self,
+        record: Option<&ArchivedHitBrick>,
+        flips: &[FlipRecord],
+        stats: &mut SignStats,
+    ) -> SignBrick {
+        let mut planes = PlanePicker::new(record);
+        let mut brick = SignBrick { base_inside: self.signs.get([0; 3]), ..Default::default() };
+        let mut hit_edges = HitEdges::new(record);
+        let mut flips = flips.iter().peekable();
+        let owned = |edge: u32| edge_position(edge).1.iter().all(|&c| c < SIDE);
+        self.marks.for_each(|edge| {
+            while let Some((passed, _)) = hit_edges.next_below(edge) {
+                self.count_unmarked(passed, owned(passed), stats);
+            }
+            while flips.next_if(|flip| flip.edge < edge).is_some() {}
+            let patch = flips.next_if(|flip| flip.edge == edge).map(|flip| flip.offset);
+            let hits = hit_edges.next_at(edge);
+            let (_, at) = edge_position(edge);
+            let up = self.signs.get(at);
+            let plane = match (hits, patch) {
+                // Seen from outside: the last hit when the lower end is inside, else the first.
+                (Some(hits), _) => planes.pick(if up { hits[hits.len() - 1] } else { hits[0] }),
+                (None, Some(offset)) => PATCH | u32::from(offset),
+                (None, None) => unreachable!("a marked edge has a hit or a flip"),
+            };
+            if owned(edge) {
+                stats.crossings += 1;
+                stats.patch_crossings += u64::from(plane & PATCH != 0);
+            }
+            brick.crossings.push(Crossing { edge, plane });
+        });
+        while let Some((passed, _)) = hit_edges.next_below(u32::MAX) {
+            self.count_unmarked(passed, owned(passed), stats);
+        }
+        brick.planes = planes.finish(&mut brick.crossings);
+        brick
+    }
+
+    fn count_unmarked(&self, edge: u32, owned: bool, stats: &mut SignStats) {
+        if owned {
+            let inside = self.signs.get(edge_position(edge).1);
+            stats.buried_edges += u64::from(inside);
+            stats.thin_edges += u64::from(!inside);
+        }
+    }
+}
+
+fn contradiction(item: &RelabelItem, expected: &'static str) -> SignError {
+    SignError::Contradiction { brick: item.load.brick.position(), expected }
+}
+
+/// Walks the hit edges of a record.
+struct HitEdges<'r> {
+    record: Option<&'r ArchivedHitBrick>,
+    next: usize,
+    first_hit: usize,
+}
+
+impl<'r> HitEdges<'r> {
+    fn new(record: Option<&'r ArchivedHitBrick>) -> Self {
+        Self { record, next: 0, first_hit: 0 }
+    }
+
+    fn peek(&self) -> Option<HitEdge> {
+        let edge = self.record?.edges.get(self.next)?;
+        Some(HitEdge { bits: edge.bits.to_native(), signed_sum: 0 })
+    }
+
+    fn advance(&mut self, edge: HitEdge) -> &'r [rkyv::rend::u32_le] {
+        let range = self.first_hit..self.first_hit + edge.kept();
+        self.next += 1;
+        self.first_hit = range.end;
+        self.record.map_or(&[], |record| &record.hits[range])
+    }
+
+    fn next_below(&mut self, limit: u32) -> Option<(u32, &'r [rkyv::rend::u32_le])> {
+        let edge = self.peek().filter(|edge| edge.edge() < limit)?;
+        Some((edge.edge(), self.advance(edge)))
+    }
+
+    fn next_at(&mut self, wanted: u32) -> Option<&'r [rkyv::rend::u32_le]> {
+        let edge = self.peek().filter(|edge| edge.edge() == wanted)?;
+        Some(self.advance(edge)).filter(|hits| !hits.is_empty())
+    }
+}
+
+/// Keeps the planes that are used, in their old order.
+struct PlanePicker<'r> {
+    record: Option<&'r ArchivedHitBrick>,
+    used: Vec<u32>,
+}
+
+impl<'r> PlanePicker<'r> {
+    fn new(record: Option<&'r ArchivedHitBrick>) -> Self {
+        Self { record, used: vec![NO_PLANE; record.map_or(0, |r| r.planes.len())] }
+    }
+
+    fn pick(&mut self, plane: rkyv::rend::u32_le) -> u32 {
+        self.used[plane.to_native() as usize] = 0;
+        plane.to_native()
+    }
+
+    fn finish(mut self, crossings: &mut [Crossing]) -> Vec<SourcePlane> {
+        let mut planes = Vec::new();
+        for (old, new) in self.used.iter_mut().enumerate().filter(|(_, new)| **new != NO_PLANE) {
+            *new = planes.len() as u32;
+            planes.extend(self.record.map(|record| SourcePlane::from(&record.planes[old])));
+        }
+        for crossing in crossings.iter_mut().filter(|crossing| crossing.plane & PATCH == 0) {
+            crossing.plane = self.used[crossing.plane as usize];
+        }
+        planes
+    }
+}
