@@ -50,8 +50,9 @@ fn stationary(a: &Symmetric, r: DVec3, lo: DVec3, hi: DVec3, state: [usize; 3]) 
     for pivot in 0..3 {
         for row in pivot + 1..3 {
             let factor = m[row][pivot] / m[pivot][pivot];
-            for column in pivot..3 {
-                m[row][column] -= factor * m[pivot][column];
+            let above = m[pivot];
+            for (value, above) in m[row].iter_mut().zip(above) {
+                *value -= factor * above;
             }
             right[row] -= factor * right[pivot];
         }

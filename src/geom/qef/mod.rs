@@ -60,7 +60,7 @@ impl QefOptions {
     #[must_use]
     pub fn new(crease_deg: f64, lo: DVec3, hi: DVec3) -> Self {
         debug_assert!(lo.cmple(hi).all(), "the box has no inside: {lo} to {hi}");
-        let crease_deg = crease_deg.max(0.0).min(90.0);
+        let crease_deg = crease_deg.clamp(0.0, 90.0);
         let half = tangent_squared(crease_deg * (std::f64::consts::PI / 360.0));
         Self { lo, hi, crease_deg, cutoff: half.max(CUTOFF_MIN) }
     }
