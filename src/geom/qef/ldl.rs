@@ -14,6 +14,7 @@ use glam::DVec3;
 const PULL: f64 = 1e-6;
 
 /// Solves (A + λE) x = r.
+#[inline]
 pub(crate) fn solve(a: &Symmetric, r: DVec3) -> DVec3 {
     let pull = PULL * trace(a);
     let first = a[0] + pull;

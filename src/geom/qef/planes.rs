@@ -38,6 +38,7 @@ pub(crate) struct Bundle {
 }
 
 /// Whether a hit's normal can be used.
+#[inline]
 pub(crate) fn is_usable(normal: DVec3) -> bool {
     // False for NaN.
     (normal.length_squared() - 1.0).abs() <= UNIT_SLACK
@@ -45,6 +46,7 @@ pub(crate) fn is_usable(normal: DVec3) -> bool {
 
 impl Bundle {
     /// Gathers the hits.
+    #[inline]
     pub(crate) fn gather(hits: &[Hit]) -> Self {
         let mut mass = DVec3::ZERO;
         let mut groups = [Group::default(); 3];
@@ -82,11 +84,13 @@ impl Bundle {
     }
 
     /// Puts the axis-parallel planes' own coordinates in the place of rounded ones.
+    #[inline]
     pub(crate) fn with_exact_coordinates(&self, at: DVec3) -> DVec3 {
         DVec3::select(self.exact.is_nan_mask(), at, self.exact)
     }
 
     /// The vertex on the planes nearest to the mass point, `None` if they do not pass the cut.
+    #[inline]
     pub(crate) fn closed_form(&self, options: &QefOptions) -> Option<DVec3> {
         let [a, b, c] = &self.groups;
         let m = self.mass_point;
@@ -98,6 +102,7 @@ impl Bundle {
         }
     }
 
+    #[inline]
     fn on_line(a: &Group, b: &Group, m: DVec3, cutoff: f64) -> Option<DVec3> {
         let sine_squared = a.normal.cross(b.normal).length_squared();
         // λ2/λ1 > cut-off, said with the determinant and the trace of the 2x2 problem.
@@ -136,14 +141,16 @@ impl Bundle {
 }
 
 impl Group {
+    #[inline]
     fn holds(&self, normal: DVec3) -> bool {
         let sign = 1.0_f64.copysign(self.normal.dot(normal));
         (normal * sign - self.normal).length_squared() <= SAME_NORMAL_SQUARED
     }
 
     /// How far along the normal the group's mean plane lies from `m`.
+    #[inline]
     fn offset(&self, m: DVec3) -> f64 {
-        self.normal.dot(self.points / self.count - m)
+        self.normal.dot(self.points) / self.count - self.normal.dot(m)
     }
 }
 
@@ -152,6 +159,7 @@ impl Group {
 /// A - tE is definite exactly when the smallest eigenvalue is above t, and the trace bounds the
 /// largest. Pivots would not do: they exceed the smallest eigenvalue up to ninefold. Near the cut
 /// the answer may be no for a matrix of full rank; the eigenvalues then decide.
+#[inline]
 pub(crate) fn is_full_rank(a: &Symmetric, cutoff: f64) -> bool {
     let t = cutoff * (a[0] + a[3] + a[5]);
     let (x, y, z) = (a[0] - t, a[3] - t, a[5] - t);
@@ -186,8 +194,13 @@ impl AxisPlanes {
     }
 }
 
+#[inline]
 fn note_axis_plane(planes: &mut [AxisPlanes; 3], hit: &Hit) {
     let n = hit.normal.abs();
+    // Nearly all normals of free shapes leave here.
+    if n.x != 1.0 && n.y != 1.0 && n.z != 1.0 {
+        return;
+    }
     if n == DVec3::X {
         planes[0].note(hit.point.x);
     } else if n == DVec3::Y {

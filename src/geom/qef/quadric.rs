@@ -25,6 +25,7 @@ pub struct Qef {
 
 impl Qef {
     /// Adds the plane through `point`, and `point` to the mass.
+    #[inline]
     pub fn add_plane(&mut self, point: DVec3, unit_normal: DVec3) {
         let n = unit_normal;
         let offset = n.dot(point);
@@ -40,6 +41,7 @@ impl Qef {
     }
 
     /// Adds a hit without a usable normal: it counts for the mass point only.
+    #[inline]
     pub fn add_point(&mut self, point: DVec3) {
         for (sum, part) in self.mass.iter_mut().zip(point.to_array()) {
             *sum += part;

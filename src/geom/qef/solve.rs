@@ -30,6 +30,7 @@ pub fn solve(hits: &[Hit], options: &QefOptions) -> Solution {
 }
 
 /// The solution of one cheap path, without the box; `None` where it would not be the truncated one.
+#[inline]
 fn free_solution(
     hits: &[Hit],
     bundle: &Bundle,
@@ -87,6 +88,7 @@ impl Qef {
     }
 }
 
+#[inline]
 fn accumulate(hits: &[Hit]) -> Qef {
     let mut qef = Qef::default();
     for hit in hits {
