@@ -1,3 +1,4 @@
 //! Exact and small geometry: no files, no threads, no cells.
 
 pub mod morton;
+pub mod qef;
