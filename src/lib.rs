@@ -19,4 +19,5 @@
 pub mod geom;
 pub mod mesh;
 pub mod monitor;
+pub mod report;
 pub mod store;
