@@ -19,7 +19,7 @@ use exr::prelude::{
 };
 
 use crate::report::image_staged::StagedFile;
-use crate::report::preview::camera::{Bounds, Camera, Grid};
+use crate::report::preview::camera::{Camera, Grid};
 use crate::report::preview::raster::{Band, Sample};
 use crate::report::preview::scene::{Face, Painter, Scene};
 use crate::report::preview::shade::BACKGROUND;
@@ -60,13 +60,10 @@ type Pixel = (f32, f32, f32, f32, f32, f32, f32, u32);
 impl LayerViews {
     fn pixel(&self, Vec2(x, y): Vec2<usize>) -> Pixel {
         let index = y / self.height * self.grid.columns as usize + x / self.width;
-        // Without bounds there are no views.
-        let (texel, depth_world) =
-            self.views.get(index).map_or((NOTHING, f32::INFINITY), |(camera, band)| {
-                let sample = band.samples[y % self.height * self.width + x % self.width];
-                (sample.paint, camera.distance_world(sample.depth))
-            });
-        let Texel { colour: [r, g, b], normal: [nx, ny, nz], part } = texel;
+        let (camera, band) = &self.views[index];
+        let sample = band.samples[y % self.height * self.width + x % self.width];
+        let depth_world = camera.distance_world(sample.depth);
+        let Texel { colour: [r, g, b], normal: [nx, ny, nz], part } = sample.paint;
         (r, g, b, depth_world, nx, ny, nz, part)
     }
 }
@@ -86,9 +83,9 @@ pub(crate) fn write_exr<E: std::error::Error>(
         let what = "A preview with layers";
         return Err(PreviewError::ShareTooSmall { what, needed_bytes, share_bytes });
     }
-    let bounds = scene.bounds()?;
-    let (input, input_stats) = draw_layer(scene, Side::Input, options, bounds.as_ref())?;
-    let (output, output_stats) = draw_layer(scene, Side::Output, options, bounds.as_ref())?;
+    let cameras = scene.cameras(options, (options.width_px, options.height_px))?;
+    let (input, input_stats) = draw_layer(scene, Side::Input, options, &cameras)?;
+    let (output, output_stats) = draw_layer(scene, Side::Output, options, &cameras)?;
     let staged = StagedFile::create(path)?;
     let mut file = BufWriter::new(staged.file());
     let size = Vec2(width_px as usize, height_px as usize);
@@ -108,21 +105,12 @@ fn draw_layer<E: std::error::Error>(
     scene: &Scene<'_, '_, E>,
     side: Side,
     options: &PreviewOptions,
-    bounds: Option<&Bounds>,
+    cameras: &[Camera],
 ) -> Result<(LayerViews, SideStats), PreviewError<E>> {
     let grid = Grid::of(options.views);
-    let size = (options.width_px, options.height_px);
-    let (width, height) = (size.0 as usize, size.1 as usize);
-    let mut views = Vec::new();
-    if let Some(bounds) = bounds {
-        for row in 0..grid.rows {
-            for column in 0..grid.columns {
-                let look = (options.views, options.up);
-                let camera = Camera::new(bounds, look, (column, row), size);
-                views.push((camera, Band::new(width, height, NOTHING)));
-            }
-        }
-    }
+    let (width, height) = (options.width_px as usize, options.height_px as usize);
+    let empty = |&camera| (camera, Band::new(width, height, NOTHING));
+    let mut views: Vec<_> = cameras.iter().map(empty).collect();
     let painter = Painter { paint: Texel::of, line_width: options.edges.then_some(LINE_SAMPLES) };
     let stats = scene.draw(side, &mut views, &painter)?;
     Ok((LayerViews { views, grid, height, width }, stats))

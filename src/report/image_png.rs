@@ -12,7 +12,7 @@ use std::mem::size_of;
 use std::path::Path;
 
 use crate::report::image_staged::StagedFile;
-use crate::report::preview::camera::{Bounds, Camera, Grid};
+use crate::report::preview::camera::{Camera, Grid};
 use crate::report::preview::raster::{Band, Sample};
 use crate::report::preview::scene::{Painter, Scene};
 use crate::report::preview::shade::{BACKGROUND, SEPARATOR, to_srgb};
@@ -60,7 +60,8 @@ pub(crate) fn write_png<E: std::error::Error>(
     options: &PreviewOptions,
 ) -> Result<PreviewStats, PreviewError<E>> {
     let layout = Layout::new(options)?;
-    let bounds = scene.bounds()?;
+    let size = (options.width_px * OVERSAMPLING, options.height_px * OVERSAMPLING);
+    let cameras = scene.cameras(options, size)?;
     let staged = StagedFile::create(path)?;
     let failed = |error: png::EncodingError| staged.failed(io::Error::from(error));
     let mut file = BufWriter::new(staged.file());
@@ -75,7 +76,7 @@ pub(crate) fn write_png<E: std::error::Error>(
     encoder.set_source_srgb(png::SrgbRenderingIntent::Perceptual);
     let mut writer = encoder.write_header().map_err(failed)?;
     let mut rows = writer.stream_writer().map_err(failed)?;
-    draw_bands(scene, options, &layout, bounds, &mut stats, |bytes| {
+    draw_bands(scene, options, &layout, &cameras, &mut stats, |bytes| {
         rows.write_all(bytes).map_err(|source| staged.failed(source))
     })?;
     rows.finish().map_err(failed)?;
@@ -91,26 +92,19 @@ fn draw_bands<E: std::error::Error>(
     scene: &Scene<'_, '_, E>,
     options: &PreviewOptions,
     layout: &Layout,
-    bounds: Option<Bounds>,
+    cameras: &[Camera],
     stats: &mut PreviewStats,
     mut write: impl FnMut(&[u8]) -> Result<(), PreviewError<E>>,
 ) -> Result<(), PreviewError<E>> {
-    let size = (options.width_px * OVERSAMPLING, options.height_px * OVERSAMPLING);
     let painter = Painter {
         paint: |face| to_srgb(face.colour),
         line_width: options.edges.then_some(LINE_SAMPLES),
     };
     let stride = 3 * layout.width_px as usize;
     let mut pixels = vec![0_u8; stride * layout.band_rows_px as usize];
-    for grid_row in 0..layout.grid.rows {
-        // Without bounds there is nothing to see and no view to set up.
-        let mut views = Vec::new();
-        for column in 0..layout.grid.columns {
-            let Some(bounds) = &bounds else { break };
-            let look = (options.views, options.up);
-            let camera = Camera::new(bounds, look, (column, grid_row), size);
-            views.push((camera, empty_band(size.0, layout.band_rows_px)));
-        }
+    for cameras in cameras.chunks(layout.grid.columns as usize) {
+        let beside = |&camera| (camera, empty_band(options.width_px, layout.band_rows_px));
+        let mut views: Vec<_> = cameras.iter().map(beside).collect();
         for first_px in (0..options.height_px).step_by(layout.band_rows_px as usize) {
             let rows_px = layout.band_rows_px.min(options.height_px - first_px);
             let pixels = &mut pixels[..stride * rows_px as usize];
@@ -130,8 +124,12 @@ fn draw_bands<E: std::error::Error>(
     Ok(())
 }
 
-fn empty_band(width: u32, rows_px: u32) -> Band<Srgb> {
-    Band::new(width as usize, (rows_px * OVERSAMPLING) as usize, to_srgb(BACKGROUND))
+fn empty_band(width_px: u32, rows_px: u32) -> Band<Srgb> {
+    Band::new(
+        (width_px * OVERSAMPLING) as usize,
+        (rows_px * OVERSAMPLING) as usize,
+        to_srgb(BACKGROUND),
+    )
 }
 
 fn restart(views: &mut [(Camera, Band<Srgb>)], first_px: u32, rows_px: u32) {

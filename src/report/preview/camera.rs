@@ -13,7 +13,34 @@ const FILL: f64 = 0.92;
 /// How far the depth range reaches beyond the bounds, relative to its length.
 const DEPTH_MARGIN: f64 = 0.05;
 
-/// The box around finite corners.
+/// What a viewer calls right, up and forward, in model space.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Frame {
+    right: DVec3,
+    up: DVec3,
+    forward: DVec3,
+}
+
+impl Frame {
+    /// The frames of all views, row by row.
+    pub(crate) fn all(views: Views, up: UpAxis) -> Vec<Self> {
+        let Grid { columns, rows } = Grid::of(views);
+        let places = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
+        let looking = |(row, column)| {
+            let (forward, up) = direction(views, up, column, row);
+            let right = forward.cross(up).normalize();
+            Self { right, up: right.cross(forward), forward }
+        };
+        places.map(looking).collect()
+    }
+
+    /// A place of the model as coordinates along right, up and forward.
+    fn along(&self, place: DVec3) -> DVec3 {
+        DVec3::new(self.right.dot(place), self.up.dot(place), self.forward.dot(place))
+    }
+}
+
+/// The box around finite corners, along the axes of a [`Frame`].
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Bounds {
     lo: DVec3,
@@ -21,15 +48,23 @@ pub(crate) struct Bounds {
 }
 
 impl Bounds {
-    /// The box around one triangle.
-    pub(crate) fn of(corners: &[DVec3; 3]) -> Self {
-        let [a, b, c] = *corners;
-        Self { lo: a.min(b).min(c), hi: a.max(b).max(c) }
+    /// The box around nothing.
+    pub(crate) const EMPTY: Self = Self { lo: DVec3::INFINITY, hi: DVec3::NEG_INFINITY };
+
+    /// Whether nothing was added.
+    pub(crate) fn is_empty(&self) -> bool {
+        self.lo.x > self.hi.x
     }
 
-    /// The box around both.
-    pub(crate) fn union(self, other: Self) -> Self {
-        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    /// Makes room for a triangle; false, and no change, when it lies too far off.
+    pub(crate) fn add(&mut self, frame: &Frame, corners: &[DVec3; 3]) -> bool {
+        let [a, b, c] = corners.map(|corner| frame.along(corner));
+        let usable = a.is_finite() && b.is_finite() && c.is_finite();
+        if usable {
+            self.lo = self.lo.min(a).min(b).min(c);
+            self.hi = self.hi.max(a).max(b).max(c);
+        }
+        usable
     }
 }
 
@@ -66,9 +101,7 @@ pub(crate) struct Projected {
 /// A parallel projection of the bounds onto one view.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Camera {
-    right: DVec3,
-    up: DVec3,
-    forward: DVec3,
+    frame: Frame,
     centre: DVec3,
     /// Model units per unit of the scaled model, whose longest half edge is 1.
     unit: f64,
@@ -80,42 +113,37 @@ pub(crate) struct Camera {
 }
 
 impl Camera {
-    /// The camera of the view in column and row of the grid; sizes in samples.
-    pub(crate) fn new(
-        bounds: &Bounds,
-        (views, up): (Views, UpAxis),
-        (column, row): (u32, u32),
-        (width, height): (u32, u32),
-    ) -> Self {
-        let (forward, up) = direction(views, up, column, row);
-        let right = forward.cross(up).normalize();
-        let up = right.cross(forward);
+    /// The camera that fits `bounds`, taken along `frame`, into a view; its size in samples.
+    pub(crate) fn new(frame: Frame, bounds: &Bounds, (width, height): (u32, u32)) -> Self {
+        // Nothing to see: any camera will do.
+        let bounds =
+            if bounds.is_empty() { &Bounds { lo: DVec3::ZERO, hi: DVec3::ZERO } } else { bounds };
         // Halves first: the difference of two huge numbers would overflow.
         let half = bounds.hi * 0.5 - bounds.lo * 0.5;
         let centre = bounds.lo * 0.5 + bounds.hi * 0.5;
         let unit = if half.max_element() > 0.0 { half.max_element() } else { 1.0 };
-        let half = half / unit;
-        let reach = |axis: DVec3| axis.abs().dot(half).max(1e-6);
+        // A flat model still needs a width, a height and a depth.
+        let reach = (half / unit).max(DVec3::splat(1e-6));
         let (width, height) = (f64::from(width), f64::from(height));
-        let scale = (width / reach(right)).min(height / reach(up)) * 0.5 * FILL;
-        let near = -reach(forward) * (1.0 + 2.0 * DEPTH_MARGIN);
+        let scale = (width / reach.x).min(height / reach.y) * 0.5 * FILL;
+        let near = -reach.z * (1.0 + 2.0 * DEPTH_MARGIN);
         let depth_range = -2.0 * near;
-        Self { right, up, forward, centre, unit, scale, width, height, near, depth_range }
+        Self { frame, centre, unit, scale, width, height, near, depth_range }
     }
 
     /// Projects a corner; infinite or NaN where it lies too far off.
     pub(crate) fn project(&self, corner: DVec3) -> Projected {
-        let from_centre = (corner - self.centre) / self.unit;
+        let from_centre = (self.frame.along(corner) - self.centre) / self.unit;
         Projected {
-            x: self.right.dot(from_centre) * self.scale + self.width * 0.5,
-            y: self.height * 0.5 - self.up.dot(from_centre) * self.scale,
-            depth: (self.forward.dot(from_centre) - self.near) / self.depth_range,
+            x: from_centre.x * self.scale + self.width * 0.5,
+            y: self.height * 0.5 - from_centre.y * self.scale,
+            depth: (from_centre.z - self.near) / self.depth_range,
         }
     }
 
     /// A normal as the viewer sees it: x right, y up, z towards the viewer.
     pub(crate) fn turn(&self, normal: DVec3) -> DVec3 {
-        DVec3::new(self.right.dot(normal), self.up.dot(normal), -self.forward.dot(normal))
+        self.frame.along(normal) * DVec3::new(1.0, 1.0, -1.0)
     }
 
     /// The distance from the near end of the depth range, in model units.
@@ -142,44 +170,35 @@ fn direction(views: Views, up: UpAxis, column: u32, row: u32) -> (DVec3, DVec3) 
 mod tests {
     use super::*;
 
-    fn cameras(bounds: &Bounds) -> Vec<Camera> {
-        let mut cameras = Vec::new();
-        for up in [UpAxis::Y, UpAxis::Z] {
-            for (views, place) in [
-                (Views::Isometric, (0, 0)),
-                (Views::Four, (0, 0)),
-                (Views::Four, (1, 0)),
-                (Views::Four, (0, 1)),
-                (Views::Four, (1, 1)),
-            ] {
-                cameras.push(Camera::new(bounds, (views, up), place, (400, 300)));
-            }
-        }
-        cameras
+    fn camera(frame: Frame, triangles: &[[DVec3; 3]]) -> Camera {
+        let mut bounds = Bounds::EMPTY;
+        assert!(triangles.iter().all(|corners| bounds.add(&frame, corners)));
+        Camera::new(frame, &bounds, (400, 300))
     }
 
     #[test]
-    fn every_view_holds_the_whole_bounds() {
-        let bounds = Bounds { lo: DVec3::new(-1e308, 2.0, 5.0), hi: DVec3::new(1e308, 9.0, 5.0) };
-        for camera in cameras(&bounds) {
-            for corner in 0..8 {
-                let pick = |bit: u32, lo, hi| if corner >> bit & 1 == 0 { lo } else { hi };
-                let at = camera.project(DVec3::new(
-                    pick(0, bounds.lo.x, bounds.hi.x),
-                    pick(1, bounds.lo.y, bounds.hi.y),
-                    pick(2, bounds.lo.z, bounds.hi.z),
-                ));
-                assert!(at.x > 0.0 && at.x < 400.0, "{at:?}");
-                assert!(at.y > 0.0 && at.y < 300.0, "{at:?}");
-                assert!(at.depth > 0.0 && at.depth < 1.0, "{at:?}");
+    fn every_view_holds_the_whole_mesh() {
+        let thin = [[-1e308, 2.0, 5.0], [1e308, 9.0, 5.0], [0.0, 2.0, 5.0]];
+        let usual = [[0.1, 2.0, -5.0], [30.0, 9.0, 5.0], [0.0, -2.0, 5.0]];
+        for corners in [thin, usual, [[7.0; 3]; 3]] {
+            let corners = corners.map(DVec3::from_array);
+            for up in [UpAxis::Y, UpAxis::Z] {
+                for frame in Frame::all(Views::Four, up) {
+                    let camera = camera(frame, &[corners]);
+                    for at in corners.map(|corner| camera.project(corner)) {
+                        assert!(at.x > 0.0 && at.x < 400.0, "{at:?}");
+                        assert!(at.y > 0.0 && at.y < 300.0, "{at:?}");
+                        assert!(at.depth > 0.0 && at.depth < 1.0, "{at:?}");
+                    }
+                }
             }
         }
     }
 
     #[test]
     fn up_is_up_and_right_is_right_in_the_front_view() {
-        let bounds = Bounds { lo: DVec3::ZERO, hi: DVec3::ONE };
-        let camera = Camera::new(&bounds, (Views::Four, UpAxis::Z), (0, 0), (100, 100));
+        let camera =
+            camera(Frame::all(Views::Four, UpAxis::Z)[0], &[[DVec3::ZERO, DVec3::ONE, DVec3::X]]);
         let origin = camera.project(DVec3::ZERO);
         assert!(camera.project(DVec3::X).x > origin.x);
         assert!(camera.project(DVec3::Z).y < origin.y);

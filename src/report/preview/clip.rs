@@ -42,7 +42,7 @@ pub(crate) fn clip(corners: [Projected; 3], mut draw: impl FnMut(&Piece)) {
 /// The signed distance to one of the six planes of the guard box, positive inside.
 fn distance(at: &Projected, plane: usize) -> f64 {
     let coordinate = [at.x, at.y, at.depth][plane / 2];
-    if plane % 2 == 0 { GUARD - coordinate } else { GUARD + coordinate }
+    if plane.is_multiple_of(2) { GUARD - coordinate } else { GUARD + coordinate }
 }
 
 fn cut(polygon: &[(Projected, bool)], plane: usize) -> Vec<(Projected, bool)> {

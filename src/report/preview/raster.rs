@@ -253,7 +253,8 @@ mod tests {
 
         #[test]
         fn a_band_of_one_row_agrees_with_the_whole_view(
-            corners in proptest::array::uniform3((-8.0..24.0, -8.0..24.0, 0.0..1.0)), row in 0..16_usize
+            corners in proptest::array::uniform3((-8.0..24.0, -8.0..24.0, 0.0..1.0)),
+            row in 0..16_usize
         ) {
             let corners = corners.map(|(x, y, depth)| Projected { x, y, depth });
             let piece = Piece { corners, mesh_edges: [true; 3] };

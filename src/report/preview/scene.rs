@@ -1,7 +1,7 @@
 //! Streams both meshes: once for the bounds, and once more for every band.
 //!
 //! In:      two [`OpenSource`]s.
-//! Out:     [`Bounds`], and triangles drawn into bands.
+//! Out:     [`Camera`]s that fit, and triangles drawn into bands.
 //! Memory:  one batch of the source.
 //! Fails:   as [`PreviewError::Source`] and [`PreviewError::Cancelled`].
 
@@ -9,11 +9,11 @@ use glam::DVec3;
 
 use crate::mesh::{MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
-use crate::report::preview::camera::{Bounds, Camera};
+use crate::report::preview::camera::{Bounds, Camera, Frame};
 use crate::report::preview::clip::clip;
 use crate::report::preview::raster::{Band, Brush};
 use crate::report::preview::shade;
-use crate::report::preview::{PreviewError, Side, SideStats};
+use crate::report::preview::{PreviewError, PreviewOptions, Side, SideStats};
 
 /// Opens a mesh from its beginning; called again for every band.
 pub type OpenSource<'a, E> = dyn Fn() -> Result<Box<dyn MeshSource<Error = E> + 'a>, E> + 'a;
@@ -30,10 +30,6 @@ pub(crate) struct Scene<'s, 'a, E> {
 
 /// A triangle as it is seen, for those who paint.
 pub(crate) struct Face {
-    /// Which mesh it belongs to.
-    pub(crate) side: Side,
-    /// Whether its back is seen.
-    pub(crate) back: bool,
     /// Linear light.
     pub(crate) colour: [f32; 3],
     /// The unit normal in model space.
@@ -51,20 +47,34 @@ pub(crate) struct Painter<P> {
 }
 
 impl<E: std::error::Error> Scene<'_, '_, E> {
-    /// The bounds of the output; of the input where the output has no finite triangle.
-    pub(crate) fn bounds(&self) -> Result<Option<Bounds>, PreviewError<E>> {
+    /// The bounds along each frame: of the output, or of the input where the output is empty.
+    fn bounds(&self, frames: &[Frame]) -> Result<Vec<Bounds>, PreviewError<E>> {
+        let mut bounds = vec![Bounds::EMPTY; frames.len()];
         for side in [Side::Output, Side::Input] {
-            let mut bounds: Option<Bounds> = None;
             self.stream(side, |corners, _| {
-                let of = Bounds::of(corners);
-                bounds = Some(bounds.map_or(of, |bounds| bounds.union(of)));
-                true
+                let mut used = true;
+                for (bounds, frame) in bounds.iter_mut().zip(frames) {
+                    used &= bounds.add(frame, corners);
+                }
+                used
             })?;
-            if bounds.is_some() {
-                return Ok(bounds);
+            if bounds.iter().any(|bounds| !bounds.is_empty()) {
+                break;
             }
         }
-        Ok(None)
+        Ok(bounds)
+    }
+
+    /// One camera per view, row by row; each fits its view (size in samples).
+    pub(crate) fn cameras(
+        &self,
+        options: &PreviewOptions,
+        size: (u32, u32),
+    ) -> Result<Vec<Camera>, PreviewError<E>> {
+        let frames = Frame::all(options.views, options.up);
+        let bounds = self.bounds(&frames)?;
+        let fit = |(&frame, bounds)| Camera::new(frame, bounds, size);
+        Ok(frames.iter().zip(&bounds).map(fit).collect())
     }
 
     /// Draws one side into bands that stand beside each other, each with its camera.
@@ -81,7 +91,7 @@ impl<E: std::error::Error> Scene<'_, '_, E> {
                 drawn &= draw_face(camera, band, corners, painter, |back| {
                     let seen = camera.turn(if back { -normal } else { normal });
                     let colour = shade::shade(side, back, seen);
-                    Face { side, back, colour, normal, part }
+                    Face { colour, normal, part }
                 });
             }
             drawn

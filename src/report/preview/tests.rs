@@ -1,4 +1,5 @@
 //! Previews of small meshes, read back from their files.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
 
 use std::cell::Cell;
 use std::fs::{self, File};
