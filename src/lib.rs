@@ -23,6 +23,7 @@ pub mod mesh;
 pub mod monitor;
 pub mod octree;
 pub mod patch;
+pub mod report;
 pub mod scan;
 pub mod sign;
 pub mod store;

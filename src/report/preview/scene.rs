@@ -1,0 +1,173 @@
+//! Streams both meshes: once for the bounds, and once more for every band.
+//!
+//! In:      two [`OpenSource`]s.
+//! Out:     [`Camera`]s that fit, and triangles drawn into bands.
+//! Memory:  one batch of the source.
+//! Fails:   as [`PreviewError::Source`] and [`PreviewError::Cancelled`].
+
+use glam::DVec3;
+
+use crate::mesh::{MeshSource, TriangleBatch};
+use crate::monitor::Monitor;
+use crate::report::preview::camera::{Bounds, Camera, Frame};
+use crate::report::preview::clip::clip;
+use crate::report::preview::raster::{Band, Brush};
+use crate::report::preview::shade;
+use crate::report::preview::{PreviewError, PreviewOptions, Side, SideStats};
+
+/// Opens a mesh from its beginning; called again for every band.
+pub type OpenSource<'a, E> = dyn Fn() -> Result<Box<dyn MeshSource<Error = E> + 'a>, E> + 'a;
+
+/// The two meshes and the caller's brake.
+pub(crate) struct Scene<'s, 'a, E> {
+    /// The mesh before the repair.
+    pub(crate) input: &'s OpenSource<'a, E>,
+    /// The mesh after it, if there is one.
+    pub(crate) output: Option<&'s OpenSource<'a, E>>,
+    /// Asked between batches.
+    pub(crate) monitor: &'s dyn Monitor,
+}
+
+/// A triangle as it is seen, for those who paint.
+pub(crate) struct Face {
+    /// Linear light.
+    pub(crate) colour: [f32; 3],
+    /// The unit normal in model space.
+    pub(crate) normal: DVec3,
+    /// Index into the parts of the source.
+    pub(crate) part: u32,
+}
+
+/// Turns a face into what a sample stores.
+pub(crate) struct Painter<P> {
+    /// Of a face, or of a line on it: the colour is the line's then.
+    pub(crate) paint: fn(&Face) -> P,
+    /// Width of the lines along edges, in samples.
+    pub(crate) line_width: Option<f64>,
+}
+
+impl<E: std::error::Error> Scene<'_, '_, E> {
+    /// The bounds along each frame: of the output, or of the input where the output is empty.
+    fn bounds(&self, frames: &[Frame]) -> Result<Vec<Bounds>, PreviewError<E>> {
+        let mut bounds = vec![Bounds::EMPTY; frames.len()];
+        for side in [Side::Output, Side::Input] {
+            self.stream(side, |corners, _| {
+                let mut used = true;
+                for (bounds, frame) in bounds.iter_mut().zip(frames) {
+                    used &= bounds.add(frame, corners);
+                }
+                used
+            })?;
+            if bounds.iter().any(|bounds| !bounds.is_empty()) {
+                break;
+            }
+        }
+        Ok(bounds)
+    }
+
+    /// One camera per view, row by row; each fits its view (size in samples).
+    pub(crate) fn cameras(
+        &self,
+        options: &PreviewOptions,
+        size: (u32, u32),
+    ) -> Result<Vec<Camera>, PreviewError<E>> {
+        let frames = Frame::all(options.views, options.up);
+        let bounds = self.bounds(&frames)?;
+        let fit = |(&frame, bounds)| Camera::new(frame, bounds, size);
+        Ok(frames.iter().zip(&bounds).map(fit).collect())
+    }
+
+    /// Draws one side into bands that stand beside each other, each with its camera.
+    pub(crate) fn draw<P: Copy>(
+        &self,
+        side: Side,
+        bands: &mut [(Camera, Band<P>)],
+        painter: &Painter<P>,
+    ) -> Result<SideStats, PreviewError<E>> {
+        let mut stats = self.stream(side, |corners, part| {
+            let normal = normal_of(corners);
+            let mut drawn = true;
+            for (camera, band) in &mut *bands {
+                drawn &= draw_face(camera, band, corners, painter, |back| {
+                    let seen = camera.turn(if back { -normal } else { normal });
+                    let colour = shade::shade(side, back, seen);
+                    Face { colour, normal, part }
+                });
+            }
+            drawn
+        })?;
+        for sample in bands.iter().flat_map(|(_, band)| &band.samples) {
+            let seen = sample.depth.is_finite();
+            stats.front_samples += u64::from(seen && !sample.back);
+            stats.back_samples += u64::from(seen && sample.back);
+        }
+        Ok(stats)
+    }
+
+    /// Calls `take` for every triangle with finite corners; it tells whether it could use it.
+    fn stream(
+        &self,
+        side: Side,
+        mut take: impl FnMut(&[DVec3; 3], u32) -> bool,
+    ) -> Result<SideStats, PreviewError<E>> {
+        let mut stats = SideStats::default();
+        let open = match side {
+            Side::Input => self.input,
+            Side::Output => match self.output {
+                Some(open) => open,
+                None => return Ok(stats),
+            },
+        };
+        let failed = |source| PreviewError::Source { side, source };
+        let mut source = open().map_err(failed)?;
+        let mut batch = TriangleBatch::default();
+        while source.next_batch(&mut batch).map_err(failed)? {
+            if self.monitor.cancelled() {
+                return Err(PreviewError::Cancelled);
+            }
+            stats.triangles += batch.len() as u64;
+            for (corners, &part) in batch.corners.iter().zip(&batch.parts) {
+                let corners = corners.map(DVec3::from_array);
+                let finite = corners.iter().all(|corner| corner.is_finite());
+                stats.skipped_triangles += u64::from(!(finite && take(&corners, part)));
+            }
+        }
+        Ok(stats)
+    }
+}
+
+/// Projects, cuts and fills one triangle; false when it lies too far off to be projected.
+fn draw_face<P: Copy>(
+    camera: &Camera,
+    band: &mut Band<P>,
+    corners: &[DVec3; 3],
+    painter: &Painter<P>,
+    face: impl Fn(bool) -> Face,
+) -> bool {
+    let projected = corners.map(|corner| camera.project(corner));
+    let near_enough =
+        projected.iter().all(|at| at.x.is_finite() && at.y.is_finite() && at.depth.is_finite());
+    if !near_enough {
+        return false;
+    }
+    clip(projected, |piece| {
+        band.draw(piece, |back| {
+            let mut face = face(back);
+            let plain = (painter.paint)(&face);
+            let line = painter.line_width.map(|width| {
+                face.colour = shade::line(face.colour);
+                ((painter.paint)(&face), width)
+            });
+            Brush { face: plain, line }
+        });
+    });
+    true
+}
+
+/// The unit normal; zero for a triangle without area.
+fn normal_of(corners: &[DVec3; 3]) -> DVec3 {
+    let [a, b, c] = *corners;
+    // Scaled first: products of tiny or huge edges would leave the range of f64.
+    let size = (b - a).abs().max((c - a).abs()).max_element();
+    ((b - a) / size).cross((c - a) / size).normalize_or_zero()
+}

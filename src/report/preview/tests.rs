@@ -1,0 +1,361 @@
+//! Previews of small meshes, read back from their files.
+#![allow(clippy::unwrap_used, reason = "a test may panic")]
+
+use std::cell::Cell;
+use std::fs::{self, File};
+use std::io::{self, BufReader};
+use std::path::Path;
+
+use exr::prelude::{ReadChannels, ReadLayers};
+
+use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::monitor::{Monitor, Void};
+use crate::report::image_exr::NO_PART;
+use crate::report::image_png::SEPARATOR_PX;
+use crate::report::preview::{
+    OpenSource, PreviewError, PreviewOptions, PreviewStats, Side, Views, write_preview,
+};
+
+type Triangles = Vec<[[f64; 3]; 3]>;
+
+/// Delivers its triangles in batches of five, numbered as parts.
+struct Listed {
+    left: std::vec::IntoIter<[[f64; 3]; 3]>,
+    parts: Vec<Part>,
+    materials: Vec<Material>,
+}
+
+impl MeshSource for Listed {
+    type Error = io::Error;
+
+    fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, io::Error> {
+        batch.clear();
+        for corners in self.left.by_ref().take(5) {
+            let number = self.parts.len() as u32;
+            self.parts.push(Part::default());
+            batch.push(corners, number, 0, number);
+        }
+        Ok(!batch.is_empty())
+    }
+    fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+    fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+    fn discarded(&self) -> Discarded {
+        Discarded::default()
+    }
+    fn bytes_read(&self) -> u64 {
+        0
+    }
+    fn vertex_count(&self) -> Option<u64> {
+        None
+    }
+}
+
+fn open(triangles: &Triangles) -> Result<Box<dyn MeshSource<Error = io::Error> + '_>, io::Error> {
+    Ok(Box::new(Listed {
+        left: triangles.clone().into_iter(),
+        parts: Vec::new(),
+        materials: vec![Material::default()],
+    }))
+}
+
+/// The unit cube with normals outwards.
+fn cube() -> Triangles {
+    let mut triangles = Vec::new();
+    for axis in 0..3 {
+        for high in [false, true] {
+            let place = |u: f64, v: f64| {
+                let mut corner = [0.0; 3];
+                corner[axis] = f64::from(u8::from(high));
+                corner[(axis + 1) % 3] = u;
+                corner[(axis + 2) % 3] = v;
+                corner
+            };
+            let mut rim = [place(0.0, 0.0), place(1.0, 0.0), place(1.0, 1.0), place(0.0, 1.0)];
+            if !high {
+                rim.reverse();
+            }
+            triangles.push([rim[0], rim[1], rim[2]]);
+            triangles.push([rim[0], rim[2], rim[3]]);
+        }
+    }
+    triangles
+}
+
+fn small() -> PreviewOptions {
+    PreviewOptions { width_px: 120, height_px: 100, ..PreviewOptions::default() }
+}
+
+fn write(
+    path: &Path,
+    input: &Triangles,
+    output: Option<&Triangles>,
+    options: &PreviewOptions,
+) -> Result<PreviewStats, PreviewError<io::Error>> {
+    let open_output = output.map(|output| move || open(output));
+    let open_output: Option<&OpenSource<'_, io::Error>> =
+        open_output.as_ref().map(|open| open as &OpenSource<'_, io::Error>);
+    write_preview(path, &|| open(input), open_output, options, &Void)
+}
+
+struct Picture {
+    width: usize,
+    height: usize,
+    bytes: Vec<u8>,
+}
+
+impl Picture {
+    fn read(path: &Path) -> Self {
+        let file = BufReader::new(File::open(path).unwrap());
+        let mut reader = png::Decoder::new(file).read_info().unwrap();
+        let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
+        let frame = reader.next_frame(&mut bytes).unwrap();
+        assert_eq!(frame.color_type, png::ColorType::Rgb);
+        Self { width: frame.width as usize, height: frame.height as usize, bytes }
+    }
+
+    fn pixel(&self, x: usize, y: usize) -> [u8; 3] {
+        let at = 3 * (y * self.width + x);
+        [self.bytes[at], self.bytes[at + 1], self.bytes[at + 2]]
+    }
+
+    /// The share of pixels, in columns `first..end`, that show no background.
+    fn coverage(&self, first: usize, end: usize) -> f64 {
+        let background = self.pixel(0, 0);
+        let places = (0..self.height).flat_map(|y| (first..end).map(move |x| (x, y)));
+        let shown = places.filter(|&(x, y)| self.pixel(x, y) != background).count();
+        shown as f64 / (self.height * (end - first)) as f64
+    }
+}
+
+#[test]
+fn the_front_view_of_a_cube_is_a_square_without_a_back_face() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cube.png");
+    let options = PreviewOptions { views: Views::Four, ..small() };
+    let stats = write(&path, &cube(), Some(&cube()), &options).unwrap();
+    let picture = Picture::read(&path);
+    assert_eq!(picture.width, 2 * 2 * 120 + SEPARATOR_PX as usize);
+    assert_eq!(picture.height, 2 * 100);
+    assert_eq!((stats.width_px as usize, stats.height_px as usize), (picture.width, 200));
+    assert_eq!(stats.bytes, fs::metadata(&path).unwrap().len());
+    assert_eq!(stats.input.triangles, 12);
+    assert_eq!((stats.input.back_samples, stats.output.back_samples), (0, 0));
+    // Three squares of 92 pixels, and the hexagon of a cube: its height is the diagonal of the
+    // projected cube, 2 sqrt(2/3) edges; its area is sqrt(3) square edges.
+    let edge = 2.0 * 92.0 / (2.0 * (2.0_f64 / 3.0).sqrt());
+    let expected = 4.0 * (3.0 * 92.0 * 92.0 + 3.0_f64.sqrt() * edge * edge / 4.0);
+    let samples = stats.output.front_samples as f64;
+    assert!((samples / expected - 1.0).abs() < 0.01, "{samples} of {expected}");
+    assert!(picture.coverage(0, 240) > 0.5);
+}
+
+#[test]
+fn the_three_visible_faces_of_a_cube_differ_in_brightness() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cube.png");
+    write(&path, &cube(), Some(&cube()), &small()).unwrap();
+    let picture = Picture::read(&path);
+    let left = 120 + SEPARATOR_PX as usize;
+    let [top, front, right] =
+        [(60, 25), (40, 65), (80, 65)].map(|(x, y)| picture.pixel(left + x, y)[0]);
+    assert!(top > right + 20 && right > front + 5 || top > front + 20 && front > right + 5);
+}
+
+#[test]
+fn the_file_is_the_same_for_any_share() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut input = cube();
+    input.truncate(9);
+    let pictures = [64 << 10, 64 << 20].map(|share_bytes| {
+        let path = folder.path().join(format!("{share_bytes}.png"));
+        let options = PreviewOptions { share_bytes, edges: true, views: Views::Four, ..small() };
+        let stats = write(&path, &input, Some(&cube()), &options).unwrap();
+        let bands = stats.bands;
+        (PreviewStats { bands: 0, ..stats }, bands, fs::read(path).unwrap())
+    });
+    assert_eq!(pictures[0].0, pictures[1].0);
+    assert!(pictures[0].1 > 10 && pictures[1].1 == 2, "{} bands", pictures[0].1);
+    assert!(pictures[0].2 == pictures[1].2);
+}
+
+#[test]
+fn triangles_that_are_not_finite_are_left_out_and_counted() {
+    let folder = tempfile::tempdir().unwrap();
+    let [clean, broken] = ["clean.png", "broken.png"].map(|name| folder.path().join(name));
+    let mut input = cube();
+    write(&clean, &input, Some(&cube()), &small()).unwrap();
+    input.insert(3, [[f64::NAN, 0.0, 0.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]]);
+    input.push([[0.0, 0.0, 0.0], [1.0, f64::INFINITY, 0.0], [0.0, 1.0, 0.0]]);
+    let stats = write(&broken, &input, Some(&cube()), &small()).unwrap();
+    assert_eq!((stats.input.triangles, stats.input.skipped_triangles), (14, 2));
+    assert_eq!(fs::read(clean).unwrap(), fs::read(broken).unwrap());
+}
+
+#[test]
+fn an_outlier_of_the_input_does_not_move_the_camera() {
+    let folder = tempfile::tempdir().unwrap();
+    let [clean, broken] = ["clean.png", "broken.png"].map(|name| folder.path().join(name));
+    let mut input = cube();
+    write(&clean, &input, Some(&cube()), &small()).unwrap();
+    // One far behind, one far in front, one that cannot even be projected.
+    input.push([[-1e9, -1e9, -1e9], [-1e9, 1e9, -1e9], [1e9, -1e9, -1e9]]);
+    input.push([[50.0, 50.0, 50.0], [50.0, 60.0, 50.0], [60.0, 50.0, 50.0]]);
+    input.push([[1e308, 1e308, 1e308], [-1e308, 1e308, 1e308], [0.0, 0.0, -1e308]]);
+    let stats = write(&broken, &input, Some(&cube()), &small()).unwrap();
+    let (clean, broken) = (Picture::read(&clean), Picture::read(&broken));
+    assert_eq!(stats.input.triangles, 15);
+    let left = 120 + SEPARATOR_PX as usize;
+    for y in 0..100 {
+        for x in left..left + 120 {
+            assert_eq!(clean.pixel(x, y), broken.pixel(x, y));
+        }
+    }
+}
+
+#[test]
+fn holes_and_turned_faces_show_their_backs() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("open.png");
+    let inside_out: Triangles = cube().into_iter().map(|[a, b, c]| [a, c, b]).collect();
+    let stats = write(&path, &cube(), Some(&inside_out), &small()).unwrap();
+    assert_eq!((stats.output.front_samples, stats.input.back_samples), (0, 0));
+    assert_eq!(stats.output.back_samples, stats.input.front_samples);
+    let [red, green, blue] = Picture::read(&path).pixel(120 + SEPARATOR_PX as usize + 60, 50);
+    assert!(red > 150 && green < 60 && blue < 60);
+}
+
+#[test]
+fn without_an_output_only_the_input_is_drawn() {
+    let folder = tempfile::tempdir().unwrap();
+    for (name, output) in [("empty.png", Some(Vec::new())), ("none.png", None)] {
+        let path = folder.path().join(name);
+        let stats = write(&path, &cube(), output.as_ref(), &small()).unwrap();
+        let picture = Picture::read(&path);
+        assert!(picture.coverage(0, 120) > 0.3);
+        assert_eq!(picture.coverage(120 + SEPARATOR_PX as usize, picture.width), 0.0);
+        assert_eq!((stats.output.triangles, stats.output.front_samples), (0, 0));
+    }
+}
+
+#[test]
+fn two_empty_meshes_give_an_empty_picture() {
+    let folder = tempfile::tempdir().unwrap();
+    for name in ["empty.png", "empty.exr"] {
+        let path = folder.path().join(name);
+        let stats = write(&path, &Vec::new(), None, &small()).unwrap();
+        assert_eq!((stats.input.triangles, stats.input.front_samples), (0, 0));
+        assert!(stats.bytes > 0);
+    }
+}
+
+#[test]
+fn edges_darken_pixels_along_the_edges_only() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plain, lined] = [false, true].map(|edges| {
+        let path = folder.path().join(format!("{edges}.png"));
+        write(&path, &cube(), None, &PreviewOptions { edges, ..small() }).unwrap();
+        Picture::read(&path)
+    });
+    let places = (0..100).flat_map(|y| (0..120).map(move |x| (x, y)));
+    let changed: Vec<_> = places.filter(|&(x, y)| plain.pixel(x, y) != lined.pixel(x, y)).collect();
+    assert!(changed.len() > 300 && changed.len() < 1500, "{}", changed.len());
+    assert!(changed.iter().all(|&(x, y)| lined.pixel(x, y)[0] <= plain.pixel(x, y)[0]));
+}
+
+#[test]
+fn both_layers_come_back_from_the_exr() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("cube.EXR");
+    let options = PreviewOptions { views: Views::Four, ..small() };
+    write(&path, &cube()[..8].to_vec(), Some(&cube()), &options).unwrap();
+    let image = exr::prelude::read()
+        .no_deep_data()
+        .largest_resolution_level()
+        .all_channels()
+        .all_layers()
+        .all_attributes()
+        .from_file(&path)
+        .unwrap();
+    let names: Vec<_> =
+        image.layer_data.iter().map(|layer| layer.attributes.layer_name.clone().unwrap()).collect();
+    assert_eq!(names.iter().map(ToString::to_string).collect::<Vec<_>>(), ["input", "output"]);
+    let output = &image.layer_data[1];
+    assert_eq!((output.size.0, output.size.1), (240, 200));
+    let value = |name: &str, x: usize, y: usize| {
+        let mut channels = output.channel_data.list.iter();
+        let channel = channels.find(|channel| channel.name.to_string() == name).unwrap();
+        f64::from(channel.sample_data.value_by_flat_index(y * 240 + x).to_f32())
+    };
+    // The middle of the front view, at the top left: the face z = 1, whose triangles are 10, 11.
+    let normal = ["normal.X", "normal.Y", "normal.Z"].map(|name| value(name, 60, 45));
+    assert_eq!(normal, [0.0, 0.0, 1.0]);
+    assert!([10.0, 11.0].contains(&value("part", 60, 45)));
+    // The depth range begins a tenth of a half edge before the cube.
+    assert!((value("Z", 60, 45) - 0.05).abs() < 1e-5, "{}", value("Z", 60, 45));
+    assert!(value("R", 60, 45) > 0.1 && value("G", 60, 45) > 0.1 && value("B", 60, 45) > 0.1);
+    assert_eq!(value("Z", 1, 1), f64::INFINITY);
+    assert_eq!(value("part", 1, 1), f64::from(NO_PART as f32));
+}
+
+#[test]
+fn what_cannot_be_drawn_is_refused_with_the_number_that_is_needed() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name: &str| folder.path().join(name);
+    let mesh = cube();
+    let tight = PreviewOptions { share_bytes: 4000, ..small() };
+    for (name, at_least) in [("a.png", 120 * 4 * 8), ("a.exr", 2 * 120 * 100 * 32)] {
+        let needed = match write(&path(name), &mesh, None, &tight) {
+            Err(PreviewError::ShareTooSmall { needed_bytes, share_bytes: 4000, .. }) => {
+                needed_bytes
+            }
+            other => panic!("{other:?}"),
+        };
+        assert!(needed >= at_least);
+        let enough = PreviewOptions { share_bytes: needed, ..tight };
+        write(&path(name), &mesh, None, &enough).unwrap();
+    }
+    let flat = PreviewOptions { height_px: 0, ..small() };
+    let refusal = write(&path("b.png"), &mesh, None, &flat);
+    assert!(matches!(refusal, Err(PreviewError::SizeUnsupported { height_px: 0, .. })));
+    let refusal = write(&path("b.jpg"), &mesh, None, &small());
+    assert!(matches!(refusal, Err(PreviewError::UnknownFormat { .. })));
+    assert!(!path("b.png").exists() && !path("b.jpg").exists());
+}
+
+#[test]
+fn a_failing_source_leaves_the_old_picture_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("old.png");
+    fs::write(&path, "old").unwrap();
+    let mesh = cube();
+    let opened = Cell::new(0);
+    // The second look at the mesh fails, when the file has been begun.
+    let fading: &OpenSource<'_, io::Error> = &|| {
+        opened.set(opened.get() + 1);
+        if opened.get() > 1 { Err(io::ErrorKind::NotFound.into()) } else { open(&mesh) }
+    };
+    let refusal = write_preview(&path, fading, None, &small(), &Void);
+    assert!(matches!(refusal, Err(PreviewError::Source { side: Side::Input, .. })));
+    assert_eq!(fs::read(&path).unwrap(), b"old");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
+}
+
+#[test]
+fn a_request_to_stop_is_heard() {
+    struct Stopping;
+    impl Monitor for Stopping {
+        fn cancelled(&self) -> bool {
+            true
+        }
+    }
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("never.png");
+    let mesh = cube();
+    let stopped = write_preview(&path, &|| open(&mesh), None, &small(), &Stopping);
+    assert!(matches!(stopped, Err(PreviewError::Cancelled)));
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
+}
