@@ -1,5 +1,102 @@
 //! From signs and Hermite data to a surface: vertices in cells, polygons around crossed edges.
 //!
-//! [`mdc`] is manifold dual contouring, the method that the guarantees rest on.
+//! In:         the brick file of sign generation.
+//! Out:        vertices and triangles into a [`MeshSink`], numbered in Morton order of the bricks.
+//! Invariant:  closed and 2-manifold by construction; every vertex strictly inside its cell, on
+//!             the lattice that the output file holds exactly; no triangle is degenerate.
+//! Units:      lattice units within a brick, model units at the sink.
+//! Memory:     per worker one brick and the border of its seven lower neighbours; 4 bytes a brick.
+//! Fails:      [`ContourError`]: the scratch disk, the sink, or bricks that contradict each other.
+//!
+//! [`mdc`] is manifold dual contouring, the method that the guarantees rest on. Other methods get
+//! a folder beside it and an arm in [`place_vertices`] and [`write_surface`].
 
 pub mod mdc;
+
+mod write;
+
+use serde::{Deserialize, Serialize};
+
+use crate::octree::{BrickError, Domain};
+use crate::store::{BrickFile, Resources, StoreError};
+
+pub use write::{WriteError, write_surface};
+
+/// Name of the brick file that [`place_vertices`] leaves.
+pub const CELLS: &str = "cells.bricks";
+
+/// How the surface is drawn from the signs.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Method {
+    /// Manifold dual contouring.
+    #[default]
+    Mdc,
+}
+
+/// Settings of contouring that change the result.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct ContourOptions {
+    /// The method.
+    pub method: Method,
+    /// Dihedral angles below this are noise.
+    pub crease_deg: f64,
+}
+
+/// What can go wrong while contouring.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ContourError {
+    /// The scratch disk fails.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// A brick's record is not what its stage writes.
+    #[error(transparent)]
+    Brick(#[from] BrickError),
+    /// Two bricks contradict each other: a bug, or a disk that lies.
+    #[error("Brick {brick:?}: expected {expected}, found otherwise")]
+    Contradiction {
+        /// Position of the brick.
+        brick: [u32; 3],
+        /// What holds for every sound set of bricks.
+        expected: &'static str,
+    },
+}
+
+/// Counts of contouring.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ContourStats {
+    /// Cells with at least one vertex.
+    pub cells: u64,
+    /// Cells with two vertices or more.
+    pub multi_cells: u64,
+    /// Ambiguous faces that were flipped to keep the surface manifold, counted once per cell.
+    pub flipped_faces: u64,
+    /// Vertices in cells.
+    pub cell_vertices: u64,
+    /// Vertices that were pulled back into their cell.
+    pub clamped_vertices: u64,
+    /// Polygons: one per crossed edge.
+    pub polygons: u64,
+    /// Polygons drawn as a fan around their crossing.
+    pub fans: u64,
+    /// Triangles written.
+    pub triangles: u64,
+    /// Vertices written.
+    pub vertices: u64,
+}
+
+/// Places the vertices of all bricks.
+///
+/// # Errors
+/// [`ContourError`].
+pub fn place_vertices(
+    signs: &BrickFile,
+    domain: &Domain,
+    options: &ContourOptions,
+    resources: &Resources,
+) -> Result<(BrickFile, ContourStats), ContourError> {
+    match options.method {
+        Method::Mdc => mdc::place_vertices(signs, domain, options, resources),
+    }
+}

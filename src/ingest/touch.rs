@@ -149,7 +149,7 @@ mod tests {
     }
 
     fn unit_domain() -> Domain {
-        Domain::around(&SnapBox { lo: [0.0; 3], hi: [1.0; 3] }, 9)
+        Domain::around(&SnapBox { lo: [0.0; 3], hi: [1.0; 3] }, 9, false).expect("room enough")
     }
 
     #[test]

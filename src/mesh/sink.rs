@@ -24,8 +24,14 @@ pub trait MeshSink {
     /// The file cannot be written.
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), Self::Error>;
 
+    /// Whether [`MeshSink::triangles`] needs the corners' positions; `corners` may be empty where
+    /// it does not.
+    fn needs_corners(&self) -> bool {
+        true
+    }
+
     /// Appends triangles: vertex numbers, and the same corners' positions for formats without
-    /// indices. Both slices have the same length.
+    /// indices. Both slices have the same length, unless the sink needs no corners.
     ///
     /// # Errors
     /// The file cannot be written.

@@ -13,8 +13,15 @@ use crate::octree::SIDE;
 /// Bits of a lattice coordinate.
 pub const LATTICE_BITS: u32 = 28;
 
-/// Cells are multiples of this many units.
+/// Cells are multiples of this many units; of fewer where cells are near the smallest allowed.
 const CELL_MULTIPLE: u64 = 64;
+const SMALL_CELL_MULTIPLE: u64 = MIN_CELL_UNITS;
+const SMALL_CELL_UNITS: u64 = 1024;
+/// A smaller cell leaves vertices no room (design: 16 steps of the output grid).
+pub const MIN_CELL_UNITS: u64 = 16;
+/// Where the middle of the model lies in its cell. Odd shares, so that planes of symmetry and
+/// other round places of a model do not fall on planes of the grid.
+const MIDDLE_SHARES: [f64; 3] = [0.287_109_375, 0.313_476_562_5, 0.339_843_75];
 /// Largest share of the grid that the model's longest side takes.
 const MAX_FILL: f64 = 0.9;
 /// Cells kept free on both sides together.
@@ -81,25 +88,56 @@ pub struct Domain {
 }
 
 impl Domain {
-    /// The domain at `depth` (4 to 15) around the finite, non-empty box of the model.
-    #[must_use]
-    pub fn around(model: &SnapBox, depth: u32) -> Self {
+    /// The domain at `depth` (4 to 15) around the finite, non-empty box of the model. With
+    /// `single_precision` every lattice point near the model is exact in f32.
+    ///
+    /// # Errors
+    /// The deepest depth at which cells keep [`MIN_CELL_UNITS`], when `depth` is beyond it.
+    pub fn around(model: &SnapBox, depth: u32, single_precision: bool) -> Result<Self, u32> {
+        let domain = Self::fitted(model, depth, single_precision);
+        match domain.wanted_cell_units(model) {
+            units if units >= MIN_CELL_UNITS as f64 => Ok(domain),
+            _ if depth == 4 => Err(0),
+            _ => {
+                Err(Self::around(model, depth - 1, single_precision)
+                    .map_or_else(|d| d, |d| d.depth))
+            }
+        }
+    }
+
+    /// The cell that the model asks for, in units; the domain's own is rounded up.
+    fn wanted_cell_units(&self, model: &SnapBox) -> f64 {
+        let half_longest = model.half_longest();
+        if half_longest == 0.0 {
+            return f64::from(self.cell_units);
+        }
+        scale(half_longest, -self.unit_exponent) * 2.0 / fill_cells(self.depth)
+    }
+
+    fn fitted(model: &SnapBox, depth: u32, single_precision: bool) -> Self {
         assert!((4..=15).contains(&depth), "depth {depth} is outside of 4..=15");
-        let cells = f64::from(1_u32 << depth);
-        let fill_cells = (MAX_FILL * cells).min(cells - MARGIN_CELLS);
         let half_longest = model.half_longest();
         let farthest = (0..3).map(|a| model.lo[a].abs().max(model.hi[a].abs())).fold(0.0, f64::max);
         // No finer than the spacing of f64 at the farthest coordinate: then origins are exact.
         let mut exponent = (exponent_of(farthest) - 52).max(MIN_UNIT_EXPONENT);
+        if single_precision {
+            // Vertices may lie a cell beyond the model's box.
+            let reach = farthest + half_longest * 0.5;
+            exponent = exponent.max(exponent_of(reach) - 23);
+        }
         let fine = exponent_of(half_longest) + 1 - LATTICE_BITS as i32;
         exponent = exponent.max(fine);
         loop {
             let units = scale(half_longest, -exponent) * 2.0;
-            let cell = ((units / fill_cells).ceil() as u64).max(1).next_multiple_of(CELL_MULTIPLE);
+            let wanted = ((units / fill_cells(depth)).ceil() as u64).max(1);
+            let multiple =
+                if wanted < SMALL_CELL_UNITS { SMALL_CELL_MULTIPLE } else { CELL_MULTIPLE };
+            let cell = wanted.next_multiple_of(multiple);
             if cell << depth <= 1 << LATTICE_BITS {
                 let centre = |a: usize| {
                     let middle = model.lo[a] * 0.5 + model.hi[a] * 0.5;
-                    scale(middle, -exponent).floor() as i64 - ((cell << depth) / 2) as i64
+                    let shift = (cell as f64 * MIDDLE_SHARES[a]) as i64;
+                    scale(middle, -exponent).floor() as i64 - ((cell << depth) / 2) as i64 - shift
                 };
                 return Self {
                     depth,
@@ -157,6 +195,12 @@ impl Domain {
     }
 }
 
+/// Cells that the model's longest side takes.
+fn fill_cells(depth: u32) -> f64 {
+    let cells = f64::from(1_u32 << depth);
+    (MAX_FILL * cells).min(cells - MARGIN_CELLS)
+}
+
 /// The exponent e with 2^e <= x < 2^(e+1); very small for zero and denormals.
 fn exponent_of(x: f64) -> i32 {
     (x.to_bits() >> 52 & 0x7ff) as i32 - 1023
@@ -178,14 +222,14 @@ mod tests {
     use proptest::prelude::*;
 
     fn check(model: SnapBox, depth: u32) {
-        let domain = Domain::around(&model, depth);
+        let domain = Domain::around(&model, depth, false).expect("room enough");
         let side = i64::from(domain.cell_units) << depth;
         assert!(side <= 1 << LATTICE_BITS);
-        assert_eq!(u64::from(domain.cell_units) % CELL_MULTIPLE, 0);
+        assert_eq!(u64::from(domain.cell_units) % SMALL_CELL_MULTIPLE, 0);
         for corner in [model.lo, model.hi] {
             let snapped = domain.snap(corner).map(i64::from);
             for (a, &q) in snapped.iter().enumerate() {
-                let margin = 3 * i64::from(domain.cell_units) / 2;
+                let margin = i64::from(domain.cell_units);
                 assert!(q >= margin && q <= side - margin, "{q} of {side}, {model:?}");
                 let back = domain.to_model(snapped)[a];
                 assert!((back - corner[a]).abs() <= power_of_two(domain.unit_exponent) * 0.5);
@@ -210,13 +254,26 @@ mod tests {
     #[test]
     fn single_precision_models_lie_on_the_lattice_unmoved() {
         let model = SnapBox { lo: [0.0; 3], hi: [f64::from(1.7_f32); 3] };
-        let domain = Domain::around(&model, 9);
+        let domain = Domain::around(&model, 9, false).expect("room enough");
         for i in 0..100 {
             let x = f64::from(0.017_f32 * i as f32);
             if x >= 0.25 {
                 assert_eq!(domain.to_model(domain.snap([x; 3]).map(i64::from)), [x; 3]);
             }
         }
+    }
+
+    #[test]
+    fn too_deep_for_single_precision_names_the_depth_that_would_do() {
+        let model = SnapBox { lo: [1e6; 3], hi: [1e6 + 100.0; 3] };
+        let deepest = Domain::around(&model, 12, true).expect_err("f32 is too coarse there");
+        assert!((4..12).contains(&deepest));
+        let domain = Domain::around(&model, deepest, true).expect("this depth would do");
+        for q in [0, 12_345, 1 << 20] {
+            let [x, _, _] = domain.to_model([q; 3]);
+            assert_eq!(f64::from(x as f32), x);
+        }
+        assert!(Domain::around(&model, 12, false).is_ok());
     }
 
     proptest! {
@@ -226,7 +283,7 @@ mod tests {
         ) {
             let model = SnapBox { lo: [at; 3], hi: [at + size; 3] };
             check(model, depth);
-            let domain = Domain::around(&model, depth);
+            let domain = Domain::around(&model, depth, false).expect("room enough");
             let share = size / (domain.cell_size() * f64::from(1_u32 << depth));
             prop_assert!(share > 0.7, "{share}");
         }

@@ -17,7 +17,7 @@ pub use brick::{
     HitBrick, HitEdge, MAX_HITS, NO_PLANE, PATCH, SignBrick, SourcePlane, decode_cells,
     decode_hits, decode_signs, encode,
 };
-pub use domain::{Domain, LATTICE_BITS, SnapBox};
+pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{
     AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,
 };
