@@ -16,6 +16,7 @@
 //! the floor, output grids too coarse for the depth. `ARCHITECTURE.md` shows the rooms and their
 //! invariants.
 
+pub mod defect;
 pub mod geom;
 pub mod mesh;
 pub mod monitor;
