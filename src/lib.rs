@@ -21,3 +21,4 @@ pub mod geom;
 pub mod mesh;
 pub mod monitor;
 pub mod store;
+pub mod verify;
