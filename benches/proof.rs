@@ -28,7 +28,7 @@ impl Sphere {
         let position = |ring: u32, side: u32| {
             let polar = std::f64::consts::PI * f64::from(ring) / f64::from(RINGS);
             let angle = std::f64::consts::TAU * f64::from(side % SIDES) / f64::from(SIDES);
-            let radius = if ring % RINGS == 0 { 0.0 } else { polar.sin() };
+            let radius = if ring.is_multiple_of(RINGS) { 0.0 } else { polar.sin() };
             [radius * angle.cos(), radius * angle.sin(), polar.cos()]
         };
         let mut batches = Vec::new();

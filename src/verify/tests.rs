@@ -187,7 +187,7 @@ fn an_empty_file_does_not_hold() {
 
 #[test]
 fn a_missing_triangle_leaves_three_boundary_edges() {
-    let open = unit_cube().changed(|s| drop(s.triangles.pop()));
+    let open = unit_cube().changed(|s| s.triangles.truncate(11));
     check(&open, &[(DefectKind::BoundaryEdge, 3)]);
 }
 
@@ -206,8 +206,7 @@ fn a_doubled_triangle_makes_three_edges_nonmanifold() {
 #[test]
 fn cubes_that_share_an_edge_are_nonmanifold_there() {
     let pair = unit_cube().with(&Solid::cube([1.0, 1.0, 0.0], 1.0)).welded();
-    let proof =
-        check(&pair, &[(DefectKind::NonmanifoldEdge, 1), (DefectKind::NonmanifoldVertex, 2)]);
+    let proof = check(&pair, &[(DefectKind::NonmanifoldEdge, 1)]);
     assert_eq!(proof.places[0].place(), Some([1.0, 1.0, 0.5]));
     assert_eq!((proof.components, proof.unused_vertices), (1, 2));
 }
@@ -223,7 +222,7 @@ fn cubes_that_share_a_vertex_are_nonmanifold_there() {
 fn vertices_in_one_place_are_found_whatever_the_sign_of_zero() {
     let apart =
         Solid::tetrahedron([0.0; 3], 1.0).with(&Solid::tetrahedron([0.0; 3], -1.0).flipped());
-    assert!(apart.vertices[4].iter().any(|x| *x == 0.0));
+    let apart = apart.changed(|s| s.vertices[4] = [-0.0; 3]);
     check(&apart, &[(DefectKind::CoincidentVertices, 1)]);
     let soup = proof(&apart, false, Outward::AllPositive, 1 << 20).0;
     assert_eq!((soup.vertices, soup.nonmanifold_vertices), (7, 1));
