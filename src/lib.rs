@@ -17,6 +17,7 @@
 //! invariants.
 
 pub mod contour;
+pub mod defect;
 pub mod geom;
 pub mod ingest;
 pub mod mesh;
@@ -27,3 +28,4 @@ pub mod report;
 pub mod scan;
 pub mod sign;
 pub mod store;
+pub mod verify;

@@ -1,0 +1,92 @@
+//! The proof: whether a file is closed, 2-manifold, oriented outward and free of degenerates.
+//!
+//! In:         a [`MeshSource`], read once.
+//! Out:        a [`Proof`]: exact counts, a few places of each defect, volume and area.
+//! Invariant:  shares no code with the stages that build surfaces. Counts and places depend on the
+//!             file alone, not on the share. A vertex is the file's own where it has numbers, a
+//!             position otherwise, compared exactly.
+//! Units:      model units.
+//! Memory:     about `share_bytes` whatever the file, at least some tens of KiB; beyond it the
+//!             work lies in scratch files (84 bytes a triangle, and 36 more for the fans).
+//! Fails:      [`VerifyError`]: the source, the scratch disk, or a request to stop. Whatever is
+//!             wrong with the mesh is in the proof.
+//! Source:     the one-cycle test of vertex links; Tarjan 1975 for components; Shewchuk 1997 for
+//!             exact signs.
+
+mod coincidence;
+mod components;
+mod crowd;
+mod exact;
+mod fans;
+mod intake;
+mod link;
+mod nesting;
+mod numbering;
+mod places;
+mod positions;
+mod proof;
+mod prover;
+mod spool;
+mod tape;
+#[cfg(test)]
+mod tests;
+
+pub use proof::{Failure, Proof};
+
+use crate::mesh::MeshSource;
+use crate::monitor::{Monitor, Stage};
+use crate::store::{Scratch, StoreError};
+use crate::verify::prover::Prover;
+
+/// What orientation is asked of closed components.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Outward {
+    /// Every volume is positive: nothing is nested (fill rule `solid`).
+    AllPositive,
+    /// Positive outside, negative inside one other, positive inside two, and so on.
+    AlternatesWithNesting,
+    /// Nothing.
+    NotAsked,
+}
+
+/// How to prove.
+#[derive(Clone, Copy, Debug)]
+pub struct ProofOptions {
+    /// Memory that the proof may take.
+    pub share_bytes: u64,
+    /// What orientation is asked.
+    pub outward: Outward,
+}
+
+/// What can go wrong while proving.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum VerifyError<E> {
+    /// The file cannot be read.
+    #[error("Cannot read the mesh to prove")]
+    Source {
+        /// The reader's own word.
+        source: E,
+    },
+    /// The scratch disk failed, or the caller asked to stop.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+}
+
+/// Reads a whole mesh and judges it.
+///
+/// # Errors
+/// The source cannot be read, the scratch disk fails, or the monitor asks to stop.
+pub fn prove<S: MeshSource + ?Sized>(
+    source: &mut S,
+    scratch: &Scratch,
+    options: &ProofOptions,
+    monitor: &dyn Monitor,
+) -> Result<Proof, VerifyError<S::Error>> {
+    monitor.begin(Stage::Verify, 0);
+    let mut prover = Prover::new(scratch, options, monitor);
+    prover.read(source)?;
+    let proof = prover.judge()?;
+    monitor.end(Stage::Verify);
+    Ok(proof)
+}

@@ -1,0 +1,249 @@
+//! The order of the passes over the tape, and the division of the share among them.
+
+use crate::defect::{
+    BoundaryEdge, CoincidentVertices, Defect, EdgePlace, InconsistentEdge, InwardComponent,
+    NonmanifoldEdge, NonmanifoldVertex, VertexPlace,
+};
+use crate::mesh::MeshSource;
+use crate::monitor::Monitor;
+use crate::store::{Labels, Scratch, StoreError};
+use crate::verify::coincidence::find_coincident;
+use crate::verify::components::{
+    Compensated, Component, Measure, OPEN, UNDECIDED, cone, each_block, unite,
+};
+use crate::verify::fans::judge_fans;
+use crate::verify::intake::{Intake, read};
+use crate::verify::link::Judgement;
+use crate::verify::nesting::{Nesting, nest};
+use crate::verify::numbering::number_positions;
+use crate::verify::places::{Positions, Smallest};
+use crate::verify::positions::position_of;
+use crate::verify::spool::Spool;
+use crate::verify::tape::Tape;
+use crate::verify::{Outward, Proof, ProofOptions, VerifyError};
+
+/// One proof under way.
+pub(crate) struct Prover<'p> {
+    scratch: &'p Scratch,
+    quarter_bytes: u64,
+    outward: Outward,
+    monitor: &'p dyn Monitor,
+    tape: Tape,
+    intake: Intake,
+    proof: Proof,
+}
+
+impl<'p> Prover<'p> {
+    /// A proof of nothing yet. The tape takes a quarter of the share, each pass at most the rest.
+    pub(crate) fn new(
+        scratch: &'p Scratch,
+        options: &ProofOptions,
+        monitor: &'p dyn Monitor,
+    ) -> Self {
+        let quarter_bytes = options.share_bytes / 4;
+        Self {
+            scratch,
+            quarter_bytes,
+            outward: options.outward,
+            monitor,
+            tape: Tape::new(scratch, quarter_bytes),
+            intake: Intake::default(),
+            proof: Proof::default(),
+        }
+    }
+
+    /// Reads the file onto the tape.
+    pub(crate) fn read<S: MeshSource + ?Sized>(
+        &mut self,
+        source: &mut S,
+    ) -> Result<(), VerifyError<S::Error>> {
+        self.intake = read(source, &mut self.tape, self.monitor)?;
+        Ok(())
+    }
+
+    /// Makes all passes.
+    pub(crate) fn judge(mut self) -> Result<Proof, StoreError> {
+        let (tape, scratch, monitor) = (&mut self.tape, self.scratch, self.monitor);
+        let indexed = self.intake.vertices.is_some();
+        let (vertices, space) = match self.intake.vertices {
+            Some(vertices) => (vertices, vertices),
+            None => {
+                let numbered = number_positions(tape, scratch, 2 * self.quarter_bytes, monitor)?;
+                (numbered.vertices, numbered.space)
+            }
+        };
+        let judgement = judge_fans(&self.tape, space, scratch, 2 * self.quarter_bytes, monitor)?;
+        self.enter_counts(vertices, &judgement);
+        self.proof.places.append(&mut self.intake.nonfinite_places);
+        self.enter_places(indexed, &judgement)?;
+        self.proof.places.append(&mut self.intake.degenerate_places);
+        if indexed {
+            self.enter_coincidence(space)?;
+        }
+        self.measure()?;
+        let mut labels = unite(&self.tape, space, scratch, self.quarter_bytes, monitor)?;
+        self.count_components(&mut labels, space - judgement.used_vertices)?;
+        if self.outward != Outward::NotAsked {
+            self.enter_orientation(&mut labels, &judgement.unbalanced)?;
+        }
+        Ok(self.proof)
+    }
+
+    fn enter_counts(&mut self, vertices: u64, judgement: &Judgement) {
+        let (intake, proof) = (&self.intake, &mut self.proof);
+        proof.vertices = vertices;
+        proof.triangles = intake.triangles;
+        proof.nonfinite_triangles = intake.nonfinite;
+        proof.degenerate_triangles = intake.degenerate;
+        proof.discarded_faces = intake.discarded_faces;
+        proof.bounds = intake.bounds;
+        proof.edges = judgement.edges;
+        proof.boundary_edges = judgement.boundary_edges;
+        proof.nonmanifold_edges = judgement.nonmanifold_edges;
+        proof.inconsistent_edges = judgement.inconsistent_edges;
+        proof.nonmanifold_vertices = judgement.nonmanifold_vertices;
+        proof.unused_vertices = vertices - judgement.used_vertices;
+        // The triangles of the topology are added when they are measured.
+        proof.euler_characteristic = judgement.used_vertices as i64 - judgement.edges as i64;
+    }
+
+    fn enter_places(&mut self, indexed: bool, judgement: &Judgement) -> Result<(), StoreError> {
+        let edges = || {
+            let boundary = judgement.boundary_places.iter().map(|(edge, ())| *edge);
+            let crowded = judgement.nonmanifold_places.iter().map(|(edge, _)| *edge);
+            let inconsistent = judgement.inconsistent_places.iter().map(|(edge, ())| *edge);
+            boundary.chain(crowded).chain(inconsistent)
+        };
+        let vertices = judgement.vertex_places.iter().map(|(vertex, _)| *vertex);
+        let ids = edges().flatten().chain(vertices).collect();
+        let positions = Positions::find(&self.tape, ids, self.monitor)?;
+        let edge_place = |edge: &[u32; 2]| EdgePlace {
+            ends: edge.map(|id| positions.of(id)),
+            vertices: indexed.then_some(*edge),
+        };
+        let places = &mut self.proof.places;
+        for (edge, ()) in judgement.boundary_places.iter() {
+            places.push(Defect::BoundaryEdge(BoundaryEdge { edge: edge_place(edge) }));
+        }
+        for (edge, triangles) in judgement.nonmanifold_places.iter() {
+            let defect = NonmanifoldEdge { edge: edge_place(edge), triangles: *triangles };
+            places.push(Defect::NonmanifoldEdge(defect));
+        }
+        for (edge, ()) in judgement.inconsistent_places.iter() {
+            places.push(Defect::InconsistentEdge(InconsistentEdge { edge: edge_place(edge) }));
+        }
+        for &(id, fans) in judgement.vertex_places.iter() {
+            let vertex = VertexPlace { position: positions.of(id), vertex: indexed.then_some(id) };
+            places.push(Defect::NonmanifoldVertex(NonmanifoldVertex { vertex, fans }));
+        }
+        Ok(())
+    }
+
+    fn enter_coincidence(&mut self, space: u64) -> Result<(), StoreError> {
+        let share_bytes = 2 * self.quarter_bytes;
+        let found = find_coincident(&self.tape, space, self.scratch, share_bytes, self.monitor)?;
+        self.proof.coincident_vertices = found.vertices;
+        for &(vertex, (first, key)) in found.places.iter() {
+            let pair = CoincidentVertices { vertices: [first, vertex], position: position_of(key) };
+            self.proof.places.push(Defect::CoincidentVertices(pair));
+        }
+        Ok(())
+    }
+
+    /// Area and volume of the whole, in file order and about the middle of the box.
+    fn measure(&mut self) -> Result<(), StoreError> {
+        let [low, high] = self.proof.bounds.unwrap_or_default();
+        let middle = std::array::from_fn(|axis| low[axis].midpoint(high[axis]));
+        let (mut area, mut volume) = (Compensated::default(), Compensated::default());
+        let mut triangles = 0;
+        self.tape.each(self.monitor, |triangle| {
+            if triangle.is_whole() {
+                triangles += 1;
+                area.add(area_of(triangle.corners));
+                volume.add(cone(triangle.corners, middle).0);
+            }
+            Ok(true)
+        })?;
+        self.proof.euler_characteristic += triangles;
+        self.proof.area = area.value();
+        self.proof.volume = volume.value() / 6.0;
+        Ok(())
+    }
+
+    fn count_components(&mut self, labels: &mut Labels, unused: u64) -> Result<(), StoreError> {
+        let mut sets = 0;
+        for vertex in 0..labels.len() as u32 {
+            sets += u64::from(labels.label(vertex)? == vertex);
+        }
+        // A vertex of no triangle is a set of its own.
+        self.proof.components = sets - unused;
+        Ok(())
+    }
+
+    fn enter_orientation(
+        &mut self,
+        labels: &mut Labels,
+        unbalanced: &Spool<u32>,
+    ) -> Result<(), StoreError> {
+        let [low, high] = self.proof.bounds.unwrap_or_default();
+        let reach = low.iter().chain(&high).fold(0.0_f64, |most, x| most.max(x.abs()));
+        let mut measure = Measure {
+            tape: &self.tape,
+            labels,
+            unbalanced,
+            count: self.proof.components,
+            reach,
+            scratch: self.scratch,
+            share_bytes: self.quarter_bytes,
+            monitor: self.monitor,
+        };
+        let components = measure.components()?;
+        let chunk = (self.quarter_bytes / 4 / 64).max(16) as usize;
+        let (tape, monitor, nested) =
+            (&self.tape, self.monitor, self.outward == Outward::AlternatesWithNesting);
+        let (mut inward, mut undecided) = (0, 0);
+        let mut places = Smallest::new();
+        each_block(&components, chunk, |components| {
+            let nestings = if nested && self.proof.components > 1 {
+                nest(components, tape, labels, monitor)?
+            } else {
+                vec![Nesting::default(); components.len()]
+            };
+            for (component, nesting) in components.iter().zip(nestings) {
+                match verdict(component, nesting) {
+                    Some(true) => {}
+                    Some(false) => {
+                        inward += 1;
+                        places.offer(component.first, component.anchor);
+                    }
+                    None => undecided += 1,
+                }
+            }
+            Ok(())
+        })?;
+        self.proof.inward_components = inward;
+        self.proof.undecided_components = undecided;
+        for &(triangle, position) in places.iter() {
+            let defect = InwardComponent { triangle, position };
+            self.proof.places.push(Defect::InwardComponent(defect));
+        }
+        Ok(())
+    }
+}
+
+/// Whether a component faces outward; an open one is not asked.
+fn verdict(component: &Component, nesting: Nesting) -> Option<bool> {
+    match component.side {
+        OPEN => Some(true),
+        UNDECIDED => None,
+        0 => Some(false),
+        _ if nesting.touches => None,
+        side => Some((side < 0) == nesting.odd),
+    }
+}
+
+fn area_of(&[a, b, c]: &[[f64; 3]; 3]) -> f64 {
+    let [u, v]: [[f64; 3]; 2] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
+    let normal: [f64; 3] = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| u[i] * v[j] - u[j] * v[i]);
+    normal.iter().map(|x| x * x).sum::<f64>().sqrt() / 2.0
+}

@@ -1,0 +1,127 @@
+//! A sequence of fixed records that is written once and read in order as often as needed.
+//!
+//! Memory: `share_bytes`; beyond that the records lie in a scratch file.
+
+use std::fs::File;
+
+use bytemuck::Pod;
+
+use crate::store::{Scratch, StoreError};
+
+/// Bytes that a spool on disk keeps back before it writes.
+const BLOCK_BYTES: usize = 64 << 10;
+
+/// Records in the order in which they came.
+pub(crate) struct Spool<R: Pod> {
+    scratch: Scratch,
+    share_bytes: usize,
+    resident: Vec<R>,
+    file: Option<File>,
+    written: u64,
+}
+
+impl<R: Pod> Spool<R> {
+    /// An empty spool that keeps at most `share_bytes` in memory.
+    pub(crate) fn new(scratch: &Scratch, share_bytes: u64) -> Self {
+        let share_bytes = usize::try_from(share_bytes).unwrap_or(usize::MAX).max(size_of::<R>());
+        let scratch = scratch.clone();
+        Self { scratch, share_bytes, resident: Vec::new(), file: None, written: 0 }
+    }
+
+    /// The number of records.
+    pub(crate) fn len(&self) -> u64 {
+        self.written + self.resident.len() as u64
+    }
+
+    /// Appends a record.
+    #[inline]
+    pub(crate) fn push(&mut self, record: R) -> Result<(), StoreError> {
+        if self.resident.len() == self.resident.capacity() {
+            self.make_room()?;
+        }
+        self.resident.push(record);
+        Ok(())
+    }
+
+    fn make_room(&mut self) -> Result<(), StoreError> {
+        let bytes = if self.file.is_some() { self.block_bytes() } else { self.share_bytes };
+        let most = bytes / size_of::<R>();
+        let now = self.resident.capacity();
+        if now < most {
+            let next = if now * 4 >= most { most } else { (now * 2).max(64).min(most) };
+            self.resident.reserve_exact(next - self.resident.len());
+            return Ok(());
+        }
+        self.flush()?;
+        if now * size_of::<R>() > self.block_bytes() {
+            let records = (self.block_bytes() / size_of::<R>()).max(1);
+            self.resident = Vec::with_capacity(records);
+        }
+        Ok(())
+    }
+
+    fn block_bytes(&self) -> usize {
+        self.share_bytes.min(BLOCK_BYTES)
+    }
+
+    fn flush(&mut self) -> Result<(), StoreError> {
+        if self.file.is_none() {
+            self.file = Some(self.scratch.anonymous("spool")?);
+        }
+        let file = self.file.as_ref().expect("the file was opened above");
+        let offset = self.written * size_of::<R>() as u64;
+        self.scratch.write_at(file, bytemuck::cast_slice(&self.resident), offset)?;
+        self.written += self.resident.len() as u64;
+        self.resident.clear();
+        Ok(())
+    }
+
+    /// Forgets all records.
+    pub(crate) fn clear(&mut self) {
+        self.resident.clear();
+        self.written = 0;
+    }
+
+    /// At most `count` records from number `start` on; `buffer` is room for those on disk.
+    ///
+    /// Fewer come where the part on disk ends, none only at the end.
+    pub(crate) fn block<'a>(
+        &'a self,
+        start: u64,
+        count: usize,
+        buffer: &'a mut Vec<R>,
+    ) -> Result<&'a [R], StoreError> {
+        if let (Some(file), true) = (&self.file, start < self.written) {
+            let there = (self.written - start).min(count as u64) as usize;
+            buffer.resize(there, R::zeroed());
+            let offset = start * size_of::<R>() as u64;
+            self.scratch.read_at(file, bytemuck::cast_slice_mut(buffer), offset)?;
+            return Ok(buffer);
+        }
+        let from = ((start - self.written) as usize).min(self.resident.len());
+        Ok(&self.resident[from..self.resident.len().min(from + count)])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_spool_on_disk_reads_like_one_in_memory() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        for share_bytes in [0, 100, 4096, 1 << 20] {
+            let mut spool = Spool::<u64>::new(&scratch, share_bytes);
+            (0..5000).for_each(|i| spool.push(i).expect("push works"));
+            assert_eq!(spool.file.is_some(), share_bytes <= 4096);
+            let (mut seen, mut buffer) = (Vec::new(), Vec::new());
+            while (seen.len() as u64) < spool.len() {
+                let block = spool.block(seen.len() as u64, 37, &mut buffer).expect("read works");
+                assert!(!block.is_empty() && block.len() <= 37);
+                seen.extend_from_slice(block);
+            }
+            assert_eq!(seen, (0..5000).collect::<Vec<_>>());
+        }
+    }
+}
