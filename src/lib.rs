@@ -17,6 +17,7 @@
 //! invariants.
 
 pub mod geom;
+pub mod io;
 pub mod mesh;
 pub mod monitor;
 pub mod store;
