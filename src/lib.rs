@@ -20,6 +20,7 @@ pub mod contour;
 pub mod defect;
 pub mod geom;
 pub mod ingest;
+pub mod io;
 pub mod mesh;
 pub mod monitor;
 pub mod octree;

@@ -2,3 +2,5 @@
 
 pub mod morton;
 pub mod qef;
+
+pub use ear_clipping::EarClipper;

@@ -1,0 +1,119 @@
+//! Model files as streams: one folder per format, each with a reader and a writer.
+//!
+//! In: a path. Out: a [`MeshSource`] that delivers batches of at most [`BATCH_TRIANGLES`]
+//! triangles in file order, or a [`MeshSink`] that takes vertices and triangles.
+//!
+//! Invariant: what is read depends on the file alone, never on the memory granted. Positions are
+//! written exactly (OBJ, PLY and OFF as `f64`, STL rounded to `f32`). Units: model units.
+//!
+//! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB), the names of parts and materials, and
+//! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`. A writer holds 256 KiB.
+
+mod detect;
+mod error;
+mod input;
+mod names;
+mod obj;
+mod off;
+mod output;
+mod ply;
+mod polygon;
+mod stl;
+#[cfg(test)]
+mod tests;
+mod words;
+
+use std::path::Path;
+
+pub use crate::io::detect::{detect, format_of_extension};
+pub use crate::io::error::{IoError, Place};
+use crate::io::obj::{ObjWriter, open_obj};
+use crate::io::off::{OffReader, OffWriter};
+use crate::io::ply::{PlyReader, PlyWriter};
+use crate::io::stl::{StlWriter, open_stl};
+use crate::mesh::{MeshSink, MeshSource};
+use crate::store::Scratch;
+
+/// The most triangles in one batch.
+pub const BATCH_TRIANGLES: usize = 4096;
+
+/// A file format that is read and written.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Format {
+    /// Wavefront OBJ with its MTL files.
+    Obj,
+    /// Stereolithography, binary or text.
+    Stl,
+    /// Stanford polygons, text or binary of either byte order.
+    Ply,
+    /// Geomview's Object File Format, text.
+    Off,
+}
+
+/// The number type that a written file holds coordinates in.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CoordinateType {
+    /// Single precision.
+    F32,
+    /// Double precision, or text that gives the double back.
+    F64,
+}
+
+impl Format {
+    /// What the writer of this format holds coordinates in.
+    #[must_use]
+    pub fn coordinates(self) -> CoordinateType {
+        match self {
+            Self::Stl => CoordinateType::F32,
+            Self::Obj | Self::Ply | Self::Off => CoordinateType::F64,
+        }
+    }
+
+    /// Whether triangles name vertices by number.
+    #[must_use]
+    pub fn has_indices(self) -> bool {
+        self != Self::Stl
+    }
+}
+
+/// How to read.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct ReadOptions {
+    /// Memory for vertices and buffers; what exceeds it goes to the scratch folder.
+    pub share_bytes: u64,
+}
+
+/// A model file being read.
+pub type Source = Box<dyn MeshSource<Error = IoError> + Send>;
+
+/// A model file being written.
+pub type Sink = Box<dyn MeshSink<Error = IoError> + Send>;
+
+/// Opens a model file; its content tells the format first, its extension second.
+///
+/// # Errors
+/// The file is missing, is no regular file, has no known format, or is broken from the start.
+pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Source, IoError> {
+    Ok(match detect(path)? {
+        Format::Obj => open_obj(path, scratch, options)?,
+        Format::Stl => open_stl(path, options)?,
+        Format::Ply => Box::new(PlyReader::open(path, scratch, options)?),
+        Format::Off => Box::new(OffReader::open(path, scratch, options)?),
+    })
+}
+
+/// Creates a model file, or empties the one that is there.
+///
+/// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text. Until
+/// [`MeshSink::finish`] the file is not valid.
+///
+/// # Errors
+/// The file or a scratch file cannot be created.
+pub fn create(path: &Path, format: Format, scratch: &Scratch) -> Result<Sink, IoError> {
+    Ok(match format {
+        Format::Obj => Box::new(ObjWriter::create(path)?),
+        Format::Stl => Box::new(StlWriter::create(path)?),
+        Format::Ply => Box::new(PlyWriter::create(path, scratch)?),
+        Format::Off => Box::new(OffWriter::create(path, scratch)?),
+    })
+}

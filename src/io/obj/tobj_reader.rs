@@ -1,0 +1,149 @@
+//! Small OBJ files, parsed by `tobj`; the only home of that crate besides the materials.
+//!
+//! Declines whatever `tobj` does not read to the end without an error. Memory: about six times the
+//! size of the file, which is at most what the caller allows.
+
+use std::path::{Path, PathBuf};
+
+use tobj::{LoadOptions, Mesh, Model};
+
+use crate::io::BATCH_TRIANGLES;
+use crate::io::error::IoError;
+use crate::io::input::Input;
+use crate::io::names::Names;
+use crate::io::obj::normalised::{Normalised, Scope, Seen};
+use crate::io::polygon::{Columns, Corner, Owner, PolygonCutter, WHITE, polygon_number};
+use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+
+/// A file that `tobj` has read, delivered in batches.
+pub(crate) struct TobjReader {
+    path: PathBuf,
+    seen: Seen,
+    models: std::vec::IntoIter<Model>,
+    mesh: Mesh,
+    scope: Scope,
+    /// Faces and corners of the mesh that were delivered.
+    face: usize,
+    corner: usize,
+    faces: u64,
+    polygon: PolygonCutter,
+    discarded: Discarded,
+    parts: Names<Part>,
+    materials: Names<Material>,
+}
+
+impl TobjReader {
+    /// Reads the whole file; `None` if it is larger than allowed, or not for `tobj`.
+    pub(crate) fn open(path: &Path, largest_bytes: u64) -> Result<Option<Self>, IoError> {
+        let input = Input::open(path, 0)?;
+        if input.size_bytes() > largest_bytes {
+            return Ok(None);
+        }
+        let mut text = Normalised::new(input);
+        let options = LoadOptions::default();
+        let loaded = tobj::load_obj_buf(&mut text, &options, |_| Ok(Default::default()));
+        let seen = text.into_seen();
+        let Ok((models, _)) = loaded else { return Ok(None) };
+        let known = models.iter().all(|model| {
+            Scope::parse(&model.name).is_some()
+                && model.mesh.vertex_color.len() == model.mesh.positions.len()
+                && model.mesh.texcoord_indices.len() == model.mesh.indices.len()
+        });
+        if !known || !seen.is_obj {
+            return Ok(None);
+        }
+        let columns =
+            Columns { indices: true, uvs: seen.textures > 0, colours: !seen.colours.is_empty() };
+        Ok(Some(Self {
+            path: path.to_path_buf(),
+            seen,
+            models: models.into_iter(),
+            mesh: Mesh::default(),
+            scope: Scope::default(),
+            face: 0,
+            corner: 0,
+            faces: 0,
+            polygon: PolygonCutter::new(columns),
+            discarded: Discarded::default(),
+            parts: Names::new(),
+            materials: Names::new(),
+        }))
+    }
+
+    /// Takes the next face, of this model or of a later one; `false` behind the last.
+    fn read_face(&mut self) -> Result<bool, IoError> {
+        while self.corner == self.mesh.indices.len() && self.face >= self.mesh.face_arities.len() {
+            let Some(model) = self.models.next() else { return Ok(false) };
+            self.mesh = model.mesh;
+            self.scope = Scope::parse(&model.name).expect("checked when the file was opened");
+            (self.face, self.corner) = (0, 0);
+        }
+        // A mesh of triangles only has no list of arities.
+        let arity = self.mesh.face_arities.get(self.face).map_or(3, |&arity| arity as usize);
+        let polygon = polygon_number(&self.path, self.faces)?;
+        self.faces += 1;
+        self.face += 1;
+        for corner in self.corner..self.corner + arity {
+            self.push_corner(corner)?;
+        }
+        self.corner += arity;
+        if arity < 3 {
+            self.discarded.short_faces += 1;
+            self.polygon.clear();
+        } else {
+            let (part, material) = self.owner()?;
+            self.polygon.close(Owner { part, material, polygon });
+        }
+        Ok(true)
+    }
+
+    fn push_corner(&mut self, corner: usize) -> Result<(), IoError> {
+        let at = 3 * self.mesh.indices[corner] as usize;
+        let position = [0, 1, 2].map(|axis| self.mesh.positions[at + axis]);
+        let vertex = self.mesh.vertex_color[at] as u32;
+        let texture = 2 * self.mesh.texcoord_indices[corner] as usize;
+        let uv = [0, 1].map(|axis| self.mesh.texcoords[texture + axis] as f32);
+        let colour = self.seen.colours.get(vertex as usize).copied().unwrap_or(WHITE);
+        self.polygon.push(&self.path, position, Corner { vertex, uv, colour })
+    }
+
+    fn owner(&mut self) -> Result<(u32, u32), IoError> {
+        let Scope { object, group, material } = self.scope;
+        let has_objects = self.seen.has_objects();
+        let name = if has_objects { &self.seen.objects[object] } else { &self.seen.groups[group] };
+        let part = self.parts.number(&self.path, name, |name| Part { name })?;
+        let name = &self.seen.materials[material];
+        let material = self.seen.library.number(&mut self.materials, &self.path, name)?;
+        Ok((part, material))
+    }
+}
+
+impl MeshSource for TobjReader {
+    type Error = IoError;
+
+    fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
+        batch.clear();
+        while self.polygon.deliver(batch) && batch.len() < BATCH_TRIANGLES && self.read_face()? {}
+        Ok(!batch.is_empty())
+    }
+
+    fn parts(&self) -> &[Part] {
+        self.parts.entries()
+    }
+
+    fn materials(&self) -> &[Material] {
+        self.materials.entries()
+    }
+
+    fn discarded(&self) -> Discarded {
+        self.discarded
+    }
+
+    fn bytes_read(&self) -> u64 {
+        self.seen.bytes_read
+    }
+
+    fn vertex_count(&self) -> Option<u64> {
+        Some(self.seen.vertices)
+    }
+}

@@ -1,0 +1,71 @@
+//! Writes OBJ text, every coordinate as the shortest text that gives its `f64` back.
+//!
+//! Vertices and faces are written as they come: indices count from the start of the file. Memory:
+//! one buffer.
+
+use std::path::Path;
+
+use crate::io::error::IoError;
+use crate::io::output::{Output, push_count, push_number};
+use crate::mesh::{MeshSink, SinkStats};
+
+/// Writes `v` and `f` lines.
+#[derive(Debug)]
+pub(crate) struct ObjWriter {
+    output: Output,
+    text: Vec<u8>,
+    vertices: u64,
+    triangles: u64,
+}
+
+impl ObjWriter {
+    pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
+        let mut output = Output::create(path)?;
+        output.write(b"# brickmend\n")?;
+        Ok(Self { output, text: Vec::new(), vertices: 0, triangles: 0 })
+    }
+}
+
+impl MeshSink for ObjWriter {
+    type Error = IoError;
+
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
+        self.vertices += positions.len() as u64;
+        for position in positions {
+            self.text.clear();
+            self.text.push(b'v');
+            for &coordinate in position {
+                self.text.push(b' ');
+                push_number(&mut self.text, coordinate);
+            }
+            self.text.push(b'\n');
+            self.output.write(&self.text)?;
+        }
+        Ok(())
+    }
+
+    fn triangles(
+        &mut self,
+        indices: &[[u32; 3]],
+        _corners: &[[[f64; 3]; 3]],
+    ) -> Result<(), IoError> {
+        self.triangles += indices.len() as u64;
+        for triangle in indices {
+            self.text.clear();
+            self.text.push(b'f');
+            for &index in triangle {
+                self.text.push(b' ');
+                push_count(&mut self.text, u64::from(index) + 1);
+            }
+            self.text.push(b'\n');
+            self.output.write(&self.text)?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
+        let Self { output, vertices, triangles, .. } = *self;
+        let bytes = output.finish()?;
+        Ok(SinkStats { vertices, triangles, bytes })
+    }
+}

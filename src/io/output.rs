@@ -1,0 +1,151 @@
+//! A file being written: buffered, counted, and handed to the disk at the end.
+//!
+//! Memory: one buffer of 256 KiB each for the file and for what waits beside it.
+
+use std::fs::File;
+use std::io::{BufWriter, Seek, SeekFrom, Write};
+use std::os::unix::fs::FileExt;
+use std::path::{Path, PathBuf};
+
+use crate::io::error::IoError;
+use crate::store::{Scratch, StoreError};
+
+const BUFFER_BYTES: usize = 256 << 10;
+
+/// The output file, append only but for its header.
+#[derive(Debug)]
+pub(crate) struct Output {
+    path: PathBuf,
+    file: BufWriter<File>,
+    bytes: u64,
+}
+
+impl Output {
+    pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
+        let file = File::create(path).map_err(|e| IoError::output("create", path, e))?;
+        let file = BufWriter::with_capacity(BUFFER_BYTES, file);
+        Ok(Self { path: path.to_path_buf(), file, bytes: 0 })
+    }
+
+    pub(crate) fn path(&self) -> &Path {
+        &self.path
+    }
+
+    #[inline]
+    pub(crate) fn write(&mut self, bytes: &[u8]) -> Result<(), IoError> {
+        self.bytes += bytes.len() as u64;
+        self.file.write_all(bytes).map_err(|e| IoError::output("write", &self.path, e))
+    }
+
+    /// Appends everything that was laid aside.
+    pub(crate) fn append(&mut self, aside: Aside) -> Result<(), IoError> {
+        let Aside { scratch, mut file, bytes } = aside;
+        let aside_error = |e| IoError::Store(StoreError::io("read from", scratch.folder(), e));
+        file.flush().map_err(aside_error)?;
+        let mut file = file.into_inner().map_err(|e| aside_error(e.into_error()))?;
+        file.seek(SeekFrom::Start(0)).map_err(aside_error)?;
+        self.flush()?;
+        let copied = std::io::copy(&mut file, self.file.get_mut())
+            .map_err(|e| IoError::output("write", &self.path, e))?;
+        debug_assert_eq!(copied, bytes);
+        scratch.count_read(copied);
+        self.bytes += copied;
+        Ok(())
+    }
+
+    /// Replaces bytes at the start of the file, which exist already.
+    pub(crate) fn patch(&mut self, bytes: &[u8], offset: u64) -> Result<(), IoError> {
+        debug_assert!(offset + bytes.len() as u64 <= self.bytes);
+        self.flush()?;
+        let patched = self.file.get_ref().write_all_at(bytes, offset);
+        patched.map_err(|e| IoError::output("write", &self.path, e))
+    }
+
+    /// Hands all bytes to the disk and tells how many they are.
+    pub(crate) fn finish(mut self) -> Result<u64, IoError> {
+        self.flush()?;
+        let synced = self.file.get_ref().sync_all();
+        synced.map_err(|e| IoError::output("synchronise", &self.path, e))?;
+        Ok(self.bytes)
+    }
+
+    fn flush(&mut self) -> Result<(), IoError> {
+        self.file.flush().map_err(|e| IoError::output("write", &self.path, e))
+    }
+}
+
+/// Bytes that belong behind others which are not complete yet: a scratch file without a name.
+#[derive(Debug)]
+pub(crate) struct Aside {
+    scratch: Scratch,
+    file: BufWriter<File>,
+    bytes: u64,
+}
+
+impl Aside {
+    pub(crate) fn new(scratch: &Scratch) -> Result<Self, IoError> {
+        let file = BufWriter::with_capacity(BUFFER_BYTES, scratch.anonymous("faces")?);
+        Ok(Self { scratch: scratch.clone(), file, bytes: 0 })
+    }
+
+    #[inline]
+    pub(crate) fn write(&mut self, bytes: &[u8]) -> Result<(), IoError> {
+        self.bytes += bytes.len() as u64;
+        self.scratch.count_written(bytes.len() as u64);
+        let written = self.file.write_all(bytes);
+        written.map_err(|e| StoreError::io("write to", self.scratch.folder(), e).into())
+    }
+}
+
+/// Appends the shortest text that gives `value` back, with an exponent where digits would be many.
+pub(crate) fn push_number(text: &mut Vec<u8>, value: f64) {
+    let size = value.abs();
+    let written = if size != 0.0 && !(1e-6..1e17).contains(&size) {
+        write!(text, "{value:e}")
+    } else {
+        write!(text, "{value}")
+    };
+    written.expect("a vector takes any bytes");
+}
+
+/// Appends a number in decimal digits.
+pub(crate) fn push_count(text: &mut Vec<u8>, mut value: u64) {
+    let mut digits = [0; 20];
+    let mut start = digits.len();
+    loop {
+        start -= 1;
+        digits[start] = b'0' + (value % 10) as u8;
+        value /= 10;
+        if value == 0 {
+            break;
+        }
+    }
+    text.extend_from_slice(&digits[start..]);
+}
+
+#[cfg(test)]
+mod tests {
+    use proptest::prelude::*;
+
+    use super::*;
+
+    proptest! {
+        #[test]
+        fn numbers_come_back_bit_by_bit(bits in any::<u64>()) {
+            let value = f64::from_bits(bits);
+            prop_assume!(!value.is_nan());
+            let mut text = Vec::new();
+            push_number(&mut text, value);
+            let text = String::from_utf8(text).expect("digits");
+            prop_assert_eq!(text.parse::<f64>().expect("a number").to_bits(), bits);
+            prop_assert!(text.len() <= 25);
+        }
+
+        #[test]
+        fn counts_are_written_as_the_standard_library_does(value in any::<u64>()) {
+            let mut text = Vec::new();
+            push_count(&mut text, value);
+            prop_assert_eq!(text, value.to_string().into_bytes());
+        }
+    }
+}

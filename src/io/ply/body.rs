@@ -1,0 +1,134 @@
+//! The numbers behind a PLY header, the same way for text and for binary.
+
+use crate::io::error::{IoError, Place};
+use crate::io::input::Input;
+use crate::io::ply::header::{Element, Encoding, Scalar};
+use crate::io::words::Words;
+
+/// The elements of a PLY file as a stream of numbers.
+#[derive(Debug)]
+pub(crate) enum Body {
+    Text { words: Words, start: (u64, u64) },
+    Binary { input: Input, start_offset: u64, big_endian: bool },
+}
+
+impl Body {
+    /// Goes on where the header ended.
+    pub(crate) fn new(words: Words, encoding: Encoding) -> Self {
+        let start_offset = words.input().offset();
+        if encoding == Encoding::Text {
+            let start = (start_offset, words.line());
+            return Self::Text { words, start };
+        }
+        let big_endian = encoding == Encoding::BigEndian;
+        Self::Binary { input: words.into_input(), start_offset, big_endian }
+    }
+
+    pub(crate) fn input(&self) -> &Input {
+        match self {
+            Self::Text { words, .. } => words.input(),
+            Self::Binary { input, .. } => input,
+        }
+    }
+
+    pub(crate) fn unreadable(&self, expected: &str, found: &str) -> IoError {
+        match self {
+            Self::Text { words, .. } => words.unreadable(expected, found),
+            Self::Binary { input, .. } => {
+                IoError::unreadable(input.path(), Place::Byte(input.offset()), expected, found)
+            }
+        }
+    }
+
+    /// Goes back to the first element.
+    pub(crate) fn rewind(&mut self) -> Result<(), IoError> {
+        match self {
+            Self::Text { words, start: (offset, line) } => words.seek(*offset, *line),
+            Self::Binary { input, start_offset, .. } => input.seek(*start_offset),
+        }
+    }
+
+    /// The next number; every type fits a double.
+    #[inline]
+    pub(crate) fn number(&mut self, scalar: Scalar) -> Result<f64, IoError> {
+        match self {
+            Self::Text { words, .. } => words.number("a number"),
+            Self::Binary { input, big_endian, .. } => {
+                let bytes = input.bytes(scalar.size_bytes(), "a number")?;
+                Ok(decode(bytes, scalar, *big_endian))
+            }
+        }
+    }
+
+    /// The length of a list whose entries are still in the file.
+    pub(crate) fn length(&mut self, length: Scalar, entry: Scalar) -> Result<u64, IoError> {
+        let number = self.number(length)?;
+        if !(number >= 0.0 && number <= f64::from(u32::MAX) && number.fract() == 0.0) {
+            return Err(self.unreadable("the length of a list", &number.to_string()));
+        }
+        let count = number as u64;
+        if let Self::Binary { input, .. } = self {
+            let needed_bytes = count * entry.size_bytes() as u64;
+            if needed_bytes > input.size_bytes().saturating_sub(input.offset()) {
+                return Err(input.ended(&format!("a list of {count} numbers")));
+            }
+        }
+        Ok(count)
+    }
+
+    /// Passes over `count` numbers.
+    pub(crate) fn skip(&mut self, scalar: Scalar, count: u64) -> Result<(), IoError> {
+        match self {
+            Self::Text { words, .. } => (0..count).try_for_each(|_| match words.word()? {
+                Some(_) => Ok(()),
+                None => Err(words.unreadable("a number", "the end of the file")),
+            }),
+            Self::Binary { input, .. } => {
+                input.skip(count.saturating_mul(scalar.size_bytes() as u64), "more numbers")
+            }
+        }
+    }
+
+    /// Passes over all of an element's entries.
+    pub(crate) fn skip_element(&mut self, element: &Element) -> Result<(), IoError> {
+        if element.properties.is_empty() {
+            return Ok(());
+        }
+        if let (Self::Binary { input, .. }, Some(stride_bytes)) =
+            (&mut *self, element.stride_bytes())
+        {
+            return input.skip(element.count.saturating_mul(stride_bytes), "more elements");
+        }
+        for _ in 0..element.count {
+            for property in &element.properties {
+                let count = match property.length {
+                    Some(length) => self.length(length, property.scalar)?,
+                    None => 1,
+                };
+                self.skip(property.scalar, count)?;
+            }
+        }
+        Ok(())
+    }
+}
+
+#[inline]
+fn decode(bytes: &[u8], scalar: Scalar, big_endian: bool) -> f64 {
+    macro_rules! number {
+        ($type:ty) => {{
+            let bytes = bytes.try_into().expect("as many bytes as the type has");
+            let big = <$type>::from_be_bytes(bytes);
+            f64::from(if big_endian { big } else { <$type>::from_le_bytes(bytes) })
+        }};
+    }
+    match scalar {
+        Scalar::I8 => number!(i8),
+        Scalar::U8 => number!(u8),
+        Scalar::I16 => number!(i16),
+        Scalar::U16 => number!(u16),
+        Scalar::I32 => number!(i32),
+        Scalar::U32 => number!(u32),
+        Scalar::F32 => number!(f32),
+        Scalar::F64 => number!(f64),
+    }
+}

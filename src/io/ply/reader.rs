@@ -1,0 +1,265 @@
+//! Streams the faces and triangle strips of a PLY file.
+//!
+//! Elements may come in any order: faces in front of the vertices are read in a second pass. Any
+//! number types, any further elements, properties and lists. Indices that lead nowhere are counted,
+//! numbers that do not parse or are missing end the reading. Memory: half of the share for the
+//! positions, an eighth for the colours, both spilled beyond.
+
+use std::path::Path;
+
+use crate::io::error::IoError;
+use crate::io::input::Input;
+use crate::io::ply::body::Body;
+use crate::io::ply::header::{Header, Kind, Role, Scalar};
+use crate::io::ply::strip::{Step, Strip};
+use crate::io::polygon::{
+    Columns, Corner, Owner, PolygonCutter, WHITE, checked_index, polygon_number,
+};
+use crate::io::words::{Dialect, Words};
+use crate::io::{BATCH_TRIANGLES, ReadOptions};
+use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::store::{Scratch, Table};
+
+/// Reads a PLY file in batches.
+pub(crate) struct PlyReader {
+    header: Header,
+    body: Body,
+    vertices_known: bool,
+    positions: Table<[f64; 3]>,
+    colours: Option<Table<[u8; 4]>>,
+    /// The element that is being read, how many of it were, and how far the next one is.
+    element: usize,
+    entry: u64,
+    property: usize,
+    strip: Strip,
+    strip_scalar: Scalar,
+    is_wild: bool,
+    polygons: u64,
+    polygon: PolygonCutter,
+    discarded: Discarded,
+    parts: [Part; 1],
+    materials: [Material; 1],
+}
+
+impl PlyReader {
+    pub(crate) fn open(
+        path: &Path,
+        scratch: &Scratch,
+        options: &ReadOptions,
+    ) -> Result<Self, IoError> {
+        let input = Input::open(path, options.share_bytes)?;
+        let mut words = Words::new(input, Dialect::Plain);
+        let header = Header::read(&mut words)?;
+        let body = Body::new(words, header.encoding);
+        let has_colours = header.has_colours();
+        let columns = Columns { indices: true, uvs: false, colours: has_colours };
+        Ok(Self {
+            header,
+            body,
+            vertices_known: false,
+            positions: Table::new(scratch, options.share_bytes / 2),
+            colours: has_colours.then(|| Table::new(scratch, options.share_bytes / 8)),
+            element: 0,
+            entry: 0,
+            property: 0,
+            strip: Strip::default(),
+            strip_scalar: Scalar::I32,
+            is_wild: false,
+            polygons: 0,
+            polygon: PolygonCutter::new(columns),
+            discarded: Discarded::default(),
+            parts: Default::default(),
+            materials: Default::default(),
+        })
+    }
+
+    /// Reads up to the vertices and through them; then stands where the first face can be.
+    fn read_vertices(&mut self) -> Result<(), IoError> {
+        self.vertices_known = true;
+        let Some(vertices) = self.header.vertex_element() else { return Ok(()) };
+        for element in &self.header.elements[..vertices] {
+            self.body.skip_element(element)?;
+        }
+        for _ in 0..self.header.elements[vertices].count {
+            self.read_vertex(vertices)?;
+        }
+        if self.header.first_surface().is_some_and(|surface| surface < vertices) {
+            self.body.rewind()?;
+        } else {
+            self.element = vertices + 1;
+        }
+        Ok(())
+    }
+
+    fn read_vertex(&mut self, element: usize) -> Result<(), IoError> {
+        let mut position = [0.0; 3];
+        let mut colour = WHITE;
+        for property in &self.header.elements[element].properties {
+            if let Some(length) = property.length {
+                let count = self.body.length(length, property.scalar)?;
+                self.body.skip(property.scalar, count)?;
+                continue;
+            }
+            let number = self.body.number(property.scalar)?;
+            match property.role {
+                Role::Coordinate(axis) => position[axis] = number,
+                Role::Colour(channel) => colour[channel] = channel_value(number, property.scalar),
+                Role::Indices | Role::Other => {}
+            }
+        }
+        if self.positions.len() >= u64::from(u32::MAX) {
+            let path = self.body.input().path();
+            return Err(IoError::too_many(path, "vertices", u64::from(u32::MAX)));
+        }
+        self.positions.push(position)?;
+        if let Some(colours) = &mut self.colours {
+            colours.push(colour)?;
+        }
+        Ok(())
+    }
+
+    /// Reads the next face or a step of a strip; `false` behind the last element.
+    fn read_on(&mut self) -> Result<bool, IoError> {
+        if self.strip.left > 0 {
+            return self.read_strip_index().map(|()| true);
+        }
+        let Some(element) = self.header.elements.get(self.element) else { return Ok(false) };
+        let is_surface = matches!(element.kind, Kind::Face | Kind::Strips);
+        if !is_surface || !element.has(Role::Indices) {
+            self.body.skip_element(element)?;
+            self.element += 1;
+        } else if self.entry == element.count {
+            self.element += 1;
+            self.entry = 0;
+        } else {
+            self.read_entry()?;
+        }
+        Ok(true)
+    }
+
+    /// Reads the rest of a face, or of an entry up to the start of a strip.
+    fn read_entry(&mut self) -> Result<(), IoError> {
+        let kind = self.header.elements[self.element].kind;
+        while let Some(&property) = self.header.elements[self.element].properties.get(self.property)
+        {
+            self.property += 1;
+            let count = match property.length {
+                Some(length) => self.body.length(length, property.scalar)?,
+                None => 1,
+            };
+            match (property.role, kind) {
+                (Role::Indices, Kind::Strips) => {
+                    self.strip = Strip::start(count);
+                    self.strip_scalar = property.scalar;
+                    return Ok(());
+                }
+                (Role::Indices, _) => self.read_corners(property.scalar, count)?,
+                _ => self.body.skip(property.scalar, count)?,
+            }
+        }
+        self.property = 0;
+        self.entry += 1;
+        if kind == Kind::Face { self.close_face() } else { Ok(()) }
+    }
+
+    fn close_face(&mut self) -> Result<(), IoError> {
+        let polygon = self.next_polygon()?;
+        if std::mem::take(&mut self.is_wild) {
+            self.discarded.wild_index_faces += 1;
+            self.polygon.clear();
+        } else if self.polygon.len() < 3 {
+            self.discarded.short_faces += 1;
+            self.polygon.clear();
+        } else {
+            self.polygon.close(Owner { part: 0, material: 0, polygon });
+        }
+        Ok(())
+    }
+
+    fn read_strip_index(&mut self) -> Result<(), IoError> {
+        let index = self.body.number(self.strip_scalar)?;
+        match self.strip.step(index, self.positions.len()) {
+            Step::Nothing => {}
+            Step::Wild => {
+                self.next_polygon()?;
+                self.discarded.wild_index_faces += 1;
+            }
+            Step::Triangle(triangle) => {
+                let polygon = self.next_polygon()?;
+                triangle.into_iter().try_for_each(|vertex| self.push_corner(vertex))?;
+                self.polygon.close(Owner { part: 0, material: 0, polygon });
+            }
+        }
+        Ok(())
+    }
+
+    /// Reads the corners of a face, and remembers whether one of them leads nowhere.
+    fn read_corners(&mut self, scalar: Scalar, count: u64) -> Result<(), IoError> {
+        for _ in 0..count {
+            let index = self.body.number(scalar)?;
+            match checked_index(index, self.positions.len()) {
+                Some(vertex) => self.push_corner(vertex)?,
+                None => self.is_wild = true,
+            }
+        }
+        Ok(())
+    }
+
+    fn push_corner(&mut self, vertex: u32) -> Result<(), IoError> {
+        let position = self.positions.get(u64::from(vertex))?;
+        let colour = match &mut self.colours {
+            Some(colours) => colours.get(u64::from(vertex))?,
+            None => WHITE,
+        };
+        let corner = Corner { vertex, colour, ..Corner::default() };
+        self.polygon.push(self.body.input().path(), position, corner)
+    }
+
+    fn next_polygon(&mut self) -> Result<u32, IoError> {
+        let number = polygon_number(self.body.input().path(), self.polygons)?;
+        self.polygons += 1;
+        Ok(number)
+    }
+}
+
+impl MeshSource for PlyReader {
+    type Error = IoError;
+
+    fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
+        batch.clear();
+        if !self.vertices_known {
+            self.read_vertices()?;
+        }
+        while self.polygon.deliver(batch) && batch.len() < BATCH_TRIANGLES && self.read_on()? {}
+        Ok(!batch.is_empty())
+    }
+
+    fn parts(&self) -> &[Part] {
+        &self.parts
+    }
+
+    fn materials(&self) -> &[Material] {
+        &self.materials
+    }
+
+    fn discarded(&self) -> Discarded {
+        self.discarded
+    }
+
+    fn bytes_read(&self) -> u64 {
+        self.body.input().bytes_read()
+    }
+
+    fn vertex_count(&self) -> Option<u64> {
+        Some(self.positions.len())
+    }
+}
+
+/// A colour channel as a byte: whole numbers by their upper bits, fractions of one by scale.
+fn channel_value(number: f64, scalar: Scalar) -> u8 {
+    match scalar {
+        Scalar::F32 | Scalar::F64 => (number * 255.0).round() as u8,
+        Scalar::I16 | Scalar::U16 => (number / 256.0) as u8,
+        _ => number as u8,
+    }
+}

@@ -1,0 +1,103 @@
+//! Writes binary little-endian PLY with `double` coordinates and `uint` indices.
+//!
+//! Faces wait in a scratch file until all vertices are there; the header has a fixed size and gets
+//! its counts at the end. Memory: two buffers.
+
+use std::path::Path;
+
+use crate::io::error::IoError;
+use crate::io::output::{Aside, Output};
+use crate::mesh::{MeshSink, SinkStats};
+use crate::store::Scratch;
+
+/// Room for any two counts.
+const HEADER_BYTES: usize = 320;
+/// Length of the list and three indices.
+const FACE_BYTES: usize = 13;
+
+/// Writes vertices at once and lays faces aside.
+#[derive(Debug)]
+pub(crate) struct PlyWriter {
+    output: Output,
+    faces: Aside,
+    vertices: u64,
+    triangles: u64,
+}
+
+impl PlyWriter {
+    pub(crate) fn create(path: &Path, scratch: &Scratch) -> Result<Self, IoError> {
+        let faces = Aside::new(scratch)?;
+        let mut output = Output::create(path)?;
+        output.write(&header(0, 0))?;
+        Ok(Self { output, faces, vertices: 0, triangles: 0 })
+    }
+}
+
+impl MeshSink for PlyWriter {
+    type Error = IoError;
+
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
+        self.vertices += positions.len() as u64;
+        for position in positions {
+            let mut bytes = [0; 24];
+            for (axis, coordinate) in position.iter().enumerate() {
+                bytes[8 * axis..8 * axis + 8].copy_from_slice(&coordinate.to_le_bytes());
+            }
+            self.output.write(&bytes)?;
+        }
+        Ok(())
+    }
+
+    fn triangles(
+        &mut self,
+        indices: &[[u32; 3]],
+        _corners: &[[[f64; 3]; 3]],
+    ) -> Result<(), IoError> {
+        self.triangles += indices.len() as u64;
+        for triangle in indices {
+            let mut bytes = [3; FACE_BYTES];
+            for (corner, index) in triangle.iter().enumerate() {
+                bytes[1 + 4 * corner..5 + 4 * corner].copy_from_slice(&index.to_le_bytes());
+            }
+            self.faces.write(&bytes)?;
+        }
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
+        let Self { mut output, faces, vertices, triangles } = *self;
+        output.append(faces)?;
+        output.patch(&header(vertices, triangles), 0)?;
+        let bytes = output.finish()?;
+        Ok(SinkStats { vertices, triangles, bytes })
+    }
+}
+
+/// The header, filled up to its fixed size in a comment.
+fn header(vertices: u64, triangles: u64) -> Vec<u8> {
+    let head = "ply\nformat binary_little_endian 1.0\ncomment brickmend";
+    let tail = format!(
+        "\nelement vertex {vertices}\n\
+         property double x\nproperty double y\nproperty double z\n\
+         element face {triangles}\n\
+         property list uchar uint vertex_indices\nend_header\n"
+    );
+    let room = HEADER_BYTES - tail.len();
+    format!("{head:<room$}{tail}").into_bytes()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_header_has_one_size_for_all_counts() {
+        for count in [0, 7, u64::MAX] {
+            let header = header(count, count);
+            assert_eq!(header.len(), HEADER_BYTES);
+            let text = String::from_utf8(header).expect("text");
+            assert!(text.contains(&format!("\nelement vertex {count}\n")));
+            assert!(text.ends_with("end_header\n"));
+        }
+    }
+}
