@@ -25,6 +25,7 @@ pub mod mesh;
 pub mod monitor;
 pub mod octree;
 pub mod patch;
+pub mod repair;
 pub mod report;
 pub mod scan;
 pub mod sign;

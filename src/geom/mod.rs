@@ -1,5 +1,6 @@
 //! Exact and small geometry: no files, no threads, no cells.
 
+mod ear_clipping;
 pub mod morton;
 pub mod qef;
 

@@ -78,6 +78,8 @@ pub struct SignStats {
     pub sealed_by_resolution_cells: u64,
     /// Edges with hits whose both ends are outside: features thinner than a cell.
     pub thin_edges: u64,
+    /// Odd edges that a patch flipped back: surface that the patch runs along, and so removes.
+    pub removed_by_patch_edges: u64,
     /// Edges with hits whose both ends are inside: surface hidden in the solid.
     pub buried_edges: u64,
 }
@@ -92,6 +94,7 @@ impl SignStats {
         self.filled_cells += other.filled_cells;
         self.sealed_by_resolution_cells += other.sealed_by_resolution_cells;
         self.thin_edges += other.thin_edges;
+        self.removed_by_patch_edges += other.removed_by_patch_edges;
         self.buried_edges += other.buried_edges;
     }
 }

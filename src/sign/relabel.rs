@@ -1,5 +1,7 @@
 //! Turns regions into signs and marks, and picks the crossing of every marked edge.
 
+use std::iter::Peekable;
+
 use crate::octree::{
     ArchivedHitBrick, CornerBits, Crossing, EdgeBits, FlipRecord, Flips, HitEdge, LINES, NO_PLANE,
     PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_hits, edge_position, encode,
@@ -164,7 +166,7 @@ impl Workspace {
         let owned = |edge: u32| edge_position(edge).1.iter().all(|&c| c < SIDE);
         self.marks.for_each(|edge| {
             while let Some((passed, _)) = hit_edges.next_below(edge) {
-                self.count_unmarked(passed, owned(passed), stats);
+                self.count_unmarked(passed, owned(passed), &mut flips, stats);
             }
             while flips.next_if(|flip| flip.edge < edge).is_some() {}
             let patch = flips.next_if(|flip| flip.edge == edge).map(|flip| flip.offset);
@@ -184,17 +186,27 @@ impl Workspace {
             brick.crossings.push(Crossing { edge, plane });
         });
         while let Some((passed, _)) = hit_edges.next_below(u32::MAX) {
-            self.count_unmarked(passed, owned(passed), stats);
+            self.count_unmarked(passed, owned(passed), &mut flips, stats);
         }
         brick.planes = planes.finish(&mut brick.crossings);
         brick
     }
 
-    fn count_unmarked(&self, edge: u32, owned: bool, stats: &mut SignStats) {
+    /// Counts an edge with hits whose two ends ended up alike.
+    fn count_unmarked<'f>(
+        &self,
+        edge: u32,
+        owned: bool,
+        flips: &mut Peekable<impl Iterator<Item = &'f FlipRecord>>,
+        stats: &mut SignStats,
+    ) {
+        while flips.next_if(|flip| flip.edge < edge).is_some() {}
+        let flipped = flips.next_if(|flip| flip.edge == edge).is_some();
         if owned {
             let inside = self.signs.get(edge_position(edge).1);
             stats.buried_edges += u64::from(inside);
-            stats.thin_edges += u64::from(!inside);
+            stats.removed_by_patch_edges += u64::from(!inside && flipped);
+            stats.thin_edges += u64::from(!inside && !flipped);
         }
     }
 }

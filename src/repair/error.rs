@@ -1,0 +1,195 @@
+//! What can end a repair without a result.
+
+use std::path::PathBuf;
+
+use crate::contour::{ContourError, WriteError};
+use crate::ingest::IngestError;
+use crate::io::IoError;
+use crate::patch::PatchError;
+use crate::sign::SignError;
+use crate::store::StoreError;
+use crate::verify::VerifyError;
+
+/// Why there is no result.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum RepairError {
+    /// The input cannot be read.
+    #[error(transparent)]
+    Input(IoError),
+    /// The input has no triangle with an area.
+    #[error("{path}: no triangle is left: {reason}")]
+    NoTriangle {
+        /// The input.
+        path: PathBuf,
+        /// What became of its faces.
+        reason: String,
+    },
+    /// `--strict` and broken faces.
+    #[error("{path}: {found} broken faces, and strict input was asked for")]
+    Broken {
+        /// The input.
+        path: PathBuf,
+        /// How many.
+        found: u64,
+    },
+    /// The memory budget is too small for any model.
+    #[error("A memory budget of {found_bytes} bytes is below the floor of {needed_bytes} bytes")]
+    BudgetBelowFloor {
+        /// The budget.
+        found_bytes: u64,
+        /// The least that would do, with one thread.
+        needed_bytes: u64,
+    },
+    /// A length with a unit for a file without one.
+    #[error("{path} states no unit, so a length in metres means nothing; give model units or %")]
+    NoUnit {
+        /// The input.
+        path: PathBuf,
+    },
+    /// Single precision cannot hold cells of this depth at this place.
+    #[error(
+        "Single precision (STL) is too coarse for depth {depth} this far from the origin: \
+         depth {possible_depth} would do, or PLY, OBJ or OFF as the output"
+    )]
+    OutputTooCoarse {
+        /// The depth asked for.
+        depth: u32,
+        /// The deepest depth that would do; 0 when none.
+        possible_depth: u32,
+    },
+    /// The result has no triangle.
+    #[error("{path}: the result has no triangle: {reason}")]
+    EmptyResult {
+        /// The input.
+        path: PathBuf,
+        /// Why.
+        reason: String,
+    },
+    /// The written file does not prove sound: a bug of ours.
+    #[error("The proof of the written file failed: {failures}; the work folder {folder} is kept")]
+    ProofFailed {
+        /// What failed, with places.
+        failures: String,
+        /// The work folder.
+        folder: PathBuf,
+    },
+    /// Another run works on the same output.
+    #[error("Another run holds {folder}")]
+    Locked {
+        /// The work folder.
+        folder: PathBuf,
+    },
+    /// The work folder or the output cannot be used.
+    #[error(transparent)]
+    Store(#[from] StoreError),
+    /// The output cannot be written.
+    #[error(transparent)]
+    Output(IoError),
+    /// Patching failed.
+    #[error("Patching failed")]
+    Patch(#[source] PatchError),
+    /// Sign generation failed.
+    #[error("Sign generation failed")]
+    Sign(#[source] SignError),
+    /// Contouring failed.
+    #[error("Contouring failed")]
+    Contour(#[source] ContourError),
+    /// The written file cannot be read back.
+    #[error("The written file cannot be read back")]
+    ReadBack(#[source] IoError),
+    /// The threads cannot be started.
+    #[error("Cannot start {threads} threads")]
+    Threads {
+        /// How many.
+        threads: usize,
+        /// The system's word.
+        source: rayon::ThreadPoolBuildError,
+    },
+}
+
+/// Whose fault an error is; decides the exit code and what becomes of the work folder.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Blame {
+    /// Ours.
+    Internal,
+    /// The command line's.
+    Usage,
+    /// The model's: no result.
+    Model,
+    /// The disk's.
+    Disk,
+    /// Another run's.
+    Lock,
+    /// The input file's.
+    Input,
+    /// The caller's: interrupted.
+    Interrupted,
+}
+
+impl RepairError {
+    /// Whose fault it is.
+    #[must_use]
+    pub fn blame(&self) -> Blame {
+        match self {
+            Self::Input(error) if error.is_input() => Blame::Input,
+            Self::Input(IoError::Store(error)) => blame_store(error),
+            Self::Input(_) | Self::Output(_) => Blame::Disk,
+            Self::NoTriangle { .. } | Self::Broken { .. } => Blame::Input,
+            Self::BudgetBelowFloor { .. } | Self::NoUnit { .. } | Self::OutputTooCoarse { .. } => {
+                Blame::Usage
+            }
+            Self::EmptyResult { .. } => Blame::Model,
+            Self::Locked { .. } => Blame::Lock,
+            Self::Store(error)
+            | Self::Patch(PatchError::Store(error))
+            | Self::Sign(SignError::Store(error))
+            | Self::Contour(ContourError::Store(error)) => blame_store(error),
+            Self::ProofFailed { .. }
+            | Self::Patch(_)
+            | Self::Sign(_)
+            | Self::Contour(_)
+            | Self::ReadBack(_)
+            | Self::Threads { .. } => Blame::Internal,
+        }
+    }
+
+    /// Whether the work folder may serve a later run, or explain this one.
+    #[must_use]
+    pub fn keeps_work(&self) -> bool {
+        matches!(self.blame(), Blame::Internal | Blame::Disk | Blame::Interrupted)
+    }
+
+    pub(crate) fn from_ingest(error: IngestError<IoError>, path: &std::path::Path) -> Self {
+        match error {
+            IngestError::Source(error) => Self::Input(error),
+            IngestError::Store(error) => Self::Store(error),
+            IngestError::Broken { found } => Self::Broken { path: path.to_path_buf(), found },
+            IngestError::TooManyTriangles { limit } => {
+                Self::Store(StoreError::TooMany { what: "Triangles of the input", limit })
+            }
+        }
+    }
+
+    pub(crate) fn from_write(error: WriteError<IoError>) -> Self {
+        match error {
+            WriteError::Contour(error) => Self::Contour(error),
+            WriteError::Sink(error) => Self::Output(error),
+        }
+    }
+
+    pub(crate) fn from_verify(error: VerifyError<IoError>) -> Self {
+        match error {
+            VerifyError::Source { source } => Self::ReadBack(source),
+            VerifyError::Store(error) => Self::Store(error),
+        }
+    }
+}
+
+fn blame_store(error: &StoreError) -> Blame {
+    match error {
+        StoreError::Cancelled => Blame::Interrupted,
+        StoreError::TooMany { .. } | StoreError::OverBudget { .. } => Blame::Usage,
+        _ => Blame::Disk,
+    }
+}

@@ -1,0 +1,25 @@
+//! The one place that knows the order of the stages.
+//!
+//! In:         a model file, [`Settings`], [`Limits`].
+//! Out:        a proven file in its place, and an [`Outcome`] that tells everything.
+//! Invariant:  the output appears whole or not at all; what was there before stays until then.
+//! Memory:     [`Limits::max_memory_bytes`], shared out by one accountant.
+//! Fails:      [`RepairError`], one message with place, and the work folder kept or removed.
+
+mod error;
+mod finish;
+mod outcome;
+mod plan;
+mod settings;
+mod stages;
+mod workspace;
+
+pub use error::{Blame, RepairError};
+pub use outcome::{
+    Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, SCHEMA_VERSION, SoupReport,
+    StageReport, Verdict,
+};
+pub use plan::{MemoryPlan, floor_bytes};
+pub use settings::{Depth, Length, Limits, Settings};
+pub use stages::repair;
+pub use workspace::Workspace;

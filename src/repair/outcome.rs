@@ -1,0 +1,168 @@
+//! What came of a repair: the JSON that the command line prints. See docs/outcome.md.
+
+use std::collections::BTreeMap;
+use std::path::PathBuf;
+
+use serde::{Deserialize, Serialize};
+
+use crate::contour::ContourStats;
+use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
+use crate::monitor::{Counter, Gauge, Stage};
+use crate::octree::{Domain, SnapBox};
+use crate::patch::{Opening, PatchStats};
+use crate::repair::settings::Settings;
+use crate::scan::ScanStats;
+use crate::sign::SignStats;
+use crate::verify::Proof;
+
+/// Version of this schema.
+pub const SCHEMA_VERSION: u32 = 1;
+
+/// How good the result is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Verdict {
+    /// Nothing to look at.
+    Pass,
+    /// Sound, but a person should look: the reasons say at what.
+    Review,
+}
+
+/// The input as it came.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SoupReport {
+    /// Its path.
+    pub path: PathBuf,
+    /// Counts.
+    #[serde(flatten)]
+    pub stats: SoupStats,
+    /// Number of parts and materials named in the file.
+    pub parts: usize,
+    /// See `parts`.
+    pub materials: usize,
+    /// Box of the finite triangles, model units.
+    pub bounds: SnapBox,
+    /// Area and signed volume.
+    #[serde(flatten)]
+    pub measure: SoupMeasure,
+}
+
+/// Defects that the input had.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Found {
+    /// Duplicates, rims, degenerate triangles.
+    #[serde(flatten)]
+    pub settle: SettleStats,
+    /// Odd faces of the grid.
+    pub odd_faces: u64,
+    /// Openings: connected sets of odd faces.
+    pub openings: u64,
+    /// Edges hit more than once: features below a cell.
+    pub multi_edges: u64,
+}
+
+/// What was added that the input did not have.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Invented {
+    /// Polygons of the output that lie on patches.
+    pub patch_polygons: u64,
+    /// Volume inside by the fill rule and outside by parity, cubic model units.
+    pub filled_volume: f64,
+    /// Part of that volume that only the resolution seals.
+    pub sealed_by_resolution_volume: f64,
+    /// The largest openings that were closed, in cells of the grid.
+    pub largest_openings: Vec<Opening>,
+}
+
+/// What the input had and the output does not. Counted in grid edges with hits.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Dropped {
+    /// Surface thinner than a cell.
+    pub thin_edges: u64,
+    /// Surface that a patch ran along, and so removed: free sheets and fins.
+    pub removed_by_patch_edges: u64,
+    /// Surface inside of the solid.
+    pub buried_edges: u64,
+    /// Share of all hit edges that none of the output's polygons stand for, 0..1.
+    pub share_of_surface: f64,
+}
+
+/// The output as it was written and proved.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OutputReport {
+    /// Its path.
+    pub path: PathBuf,
+    /// Its size.
+    pub bytes: u64,
+    /// The proof on the written file.
+    pub proof: Proof,
+    /// Output area over input area.
+    pub area_ratio: f64,
+    /// Counts of contouring.
+    pub contour: ContourStats,
+}
+
+/// What a stage took; the caller stamps the seconds.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct StageReport {
+    /// Wall time.
+    pub seconds: f64,
+    /// Time of the processors, all threads together.
+    pub cpu_seconds: f64,
+}
+
+/// What the run held.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct MemoryReport {
+    /// `--max-memory`.
+    pub budget_bytes: u64,
+    /// The most that the accountant had granted.
+    pub granted_bytes: u64,
+    /// Peak resident memory as the kernel tells it (VmHWM); the caller fills it in.
+    pub peak_bytes: Option<u64>,
+    /// Threads that worked.
+    pub threads: usize,
+    /// Peaks of what was resident.
+    pub resident: BTreeMap<Gauge, u64>,
+}
+
+/// Everything about a repair.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Outcome {
+    /// [`SCHEMA_VERSION`].
+    pub schema: u32,
+    /// Version of the program.
+    pub version: String,
+    /// How good the result is.
+    pub verdict: Verdict,
+    /// What a person should look at.
+    pub reasons: Vec<String>,
+    /// The input.
+    pub input: SoupReport,
+    /// The settings.
+    pub settings: Settings,
+    /// The grid.
+    pub grid: Domain,
+    /// Side of a cell, model units.
+    pub cell_size: f64,
+    /// Defects found.
+    pub found: Found,
+    /// Added.
+    pub invented: Invented,
+    /// Left out.
+    pub dropped: Dropped,
+    /// The output.
+    pub output: OutputReport,
+    /// Counts of scan, patch and sign.
+    pub scan: ScanStats,
+    /// See `scan`.
+    pub patch: PatchStats,
+    /// See `scan`.
+    pub sign: SignStats,
+    /// Seconds per stage.
+    pub stages: BTreeMap<Stage, StageReport>,
+    /// Bytes moved and triangles scanned.
+    pub counters: BTreeMap<Counter, u64>,
+    /// Memory.
+    pub memory: MemoryReport,
+}
