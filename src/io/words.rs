@@ -60,6 +60,7 @@ impl Words {
     }
 
     /// The next word, on this line or a later one; `None` at the end of the file.
+    #[inline]
     pub(crate) fn word(&mut self) -> Result<Option<&[u8]>, IoError> {
         while !self.find_word()? {
             if !self.skip_line()? {
@@ -71,6 +72,7 @@ impl Words {
     }
 
     /// The next word on this line; the line's end is left where it is.
+    #[inline]
     pub(crate) fn word_on_line(&mut self) -> Result<Option<&[u8]>, IoError> {
         if !self.find_word()? {
             return Ok(None);
@@ -80,6 +82,7 @@ impl Words {
     }
 
     /// The next word as a number, on this line or a later one.
+    #[inline]
     pub(crate) fn number(&mut self, expected: &str) -> Result<f64, IoError> {
         let Some(word) = self.word()? else {
             return Err(self.unreadable(expected, "the end of the file"));
@@ -94,6 +97,7 @@ impl Words {
     }
 
     /// The next word on this line as a number; `None` where the line ends.
+    #[inline]
     pub(crate) fn number_on_line(&mut self, expected: &str) -> Result<Option<f64>, IoError> {
         let Some(word) = self.word_on_line()? else { return Ok(None) };
         match parse_number(word) {
@@ -216,7 +220,7 @@ impl Words {
 
 #[inline]
 fn is_blank(byte: u8) -> bool {
-    matches!(byte, 9..=13 | b' ')
+    byte <= b' ' && matches!(byte, 9..=13 | b' ')
 }
 
 #[cfg(test)]
