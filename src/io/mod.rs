@@ -11,8 +11,11 @@
 
 mod detect;
 mod error;
+#[cfg(test)]
+mod hostile_tests;
 mod input;
 mod names;
+mod numbers;
 mod obj;
 mod off;
 mod output;

@@ -136,5 +136,7 @@ pub(crate) fn polygon_number(path: &Path, number: u64) -> Result<u32, IoError> {
 /// An index as files write it, counted from 0, if there is such a vertex.
 #[inline]
 pub(crate) fn checked_index(index: f64, count: u64) -> Option<u32> {
-    (index >= 0.0 && index < count as f64 && index.fract() == 0.0).then_some(index as u32)
+    // The cast saturates, and gives back what it was given for whole numbers only.
+    let vertex = index as u32;
+    (f64::from(vertex) == index && u64::from(vertex) < count).then_some(vertex)
 }

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use proptest::prelude::*;
 
-use crate::io::polygon::MOST_CORNERS;
-use crate::io::{BATCH_TRIANGLES, Format, IoError, Place, ReadOptions, create, open};
+use crate::io::{BATCH_TRIANGLES, Format, IoError, ReadOptions, create, open};
 use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
 use crate::store::Scratch;
 
@@ -80,7 +79,7 @@ fn read_path(path: &Path, share_bytes: u64) -> Result<Content, IoError> {
     read_all(open(path, &scratch, &ReadOptions { share_bytes })?.as_mut())
 }
 
-fn read_bytes(name: &str, content: &[u8]) -> Result<Content, IoError> {
+pub(crate) fn read_bytes(name: &str, content: &[u8]) -> Result<Content, IoError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join(name);
     std::fs::write(&path, content).expect("a file");
@@ -144,7 +143,7 @@ proptest! {
 }
 
 /// Small files that between them use everything the readers know.
-fn samples() -> Vec<(&'static str, Vec<u8>)> {
+pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
     let mut binary_stl = vec![0; 84];
     binary_stl[80] = 3;
     binary_stl.extend((0..150_u8).map(|i| i.wrapping_mul(37)));
@@ -218,7 +217,7 @@ fn all_samples_are_readable_and_say_what_they_say() {
 #[test]
 fn ascii_ply_passes_over_strange_lists_and_keeps_colours() {
     let content = read_bytes("a.ply", ascii_ply().as_bytes()).expect("readable");
-    assert_eq!(content.batch.corners[1][1], [1.0, 1.0, 0.0]);
+    assert!(content.batch.corners[..2].iter().all(|corners| corners.contains(&[1.0, 1.0, 0.0])));
     assert_eq!(content.batch.colours[0], [[255, 0, 0, 255]; 3]);
     assert_eq!(content.batch.indices[2..], [[0, 1, 2], [2, 1, 3]]);
     assert_eq!(content.batch.polygons, [0, 0, 3, 4]);
@@ -230,108 +229,6 @@ fn both_byte_orders_and_faces_before_vertices_read_alike() {
     assert_eq!(little, read_bytes("c.ply", &binary_ply(true)).expect("readable"));
     let expected = [[0.1, -7.0, 0.5], [1.0, 0.0, 0.0], [0.0, 1.0, 0.25]];
     assert_eq!(little.batch.corners, [expected]);
-}
-
-#[test]
-fn files_cut_at_any_byte_end_in_an_answer() {
-    for (name, bytes) in samples() {
-        let whole = read_bytes(name, &bytes).expect("readable").batch.len();
-        for length in 0..bytes.len() {
-            if let Ok(content) = read_bytes(name, &bytes[..length]) {
-                assert!(content.batch.len() <= whole, "{name} cut at {length}");
-            }
-        }
-    }
-}
-
-#[test]
-fn binary_files_that_end_too_early_are_refused_with_the_offset() {
-    for name in ["b.stl", "b.ply", "c.ply"] {
-        let (_, bytes) = samples().into_iter().find(|sample| sample.0 == name).expect("a sample");
-        let length = bytes.len() - 1;
-        match read_bytes(name, &bytes[..length]) {
-            Err(IoError::Unreadable { place: Place::Byte(offset), .. }) => {
-                assert_eq!(offset, length as u64, "{name}");
-            }
-            other => panic!("{name}: {other:?}"),
-        }
-    }
-}
-
-#[test]
-fn text_files_that_end_too_early_are_refused_with_the_line() {
-    for (name, line) in [("a.stl", 4), ("a.off", 5), ("a.ply", 24)] {
-        let (_, bytes) = samples().into_iter().find(|sample| sample.0 == name).expect("a sample");
-        let text = String::from_utf8(bytes).expect("text");
-        let cut: Vec<_> = text.lines().take(line).collect();
-        match read_bytes(name, cut.join("\n").as_bytes()) {
-            Err(IoError::Unreadable { place: Place::Line(found), .. }) => {
-                assert_eq!(found, line as u64, "{name}");
-            }
-            other => panic!("{name}: {other:?}"),
-        }
-    }
-}
-
-proptest! {
-    #[test]
-    fn mutated_files_never_bring_a_reader_down(
-        sample in 0..7_usize,
-        edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3_u8), 1..6),
-    ) {
-        let (name, mut bytes) = samples().swap_remove(sample);
-        for (place, byte, kind) in edits {
-            let at = place.index(bytes.len());
-            match kind {
-                0 => bytes[at] = byte,
-                1 => bytes.insert(at, byte),
-                _ => { bytes.remove(at); }
-            }
-        }
-        let result = read_bytes(name, &bytes);
-        let blames_input = result.err().is_none_or(|error| error.is_input());
-        prop_assert!(blames_input);
-    }
-}
-
-#[test]
-fn absurd_counts_without_content_are_refused_at_once() {
-    let ply = |encoding: &str, elements: &str| {
-        format!("ply\nformat {encoding} 1.0\n{elements}end_header\n\u{1}\u{2}\u{3}\n").into_bytes()
-    };
-    let xyz = "property float x\nproperty float y\nproperty float z\n";
-    let vertices = format!("element vertex 4000000000\n{xyz}");
-    let faces = format!(
-        "element vertex 0\n{xyz}element face 18446744073709551615\n\
-         property list uint int vertex_indices\n"
-    );
-    let others = format!("element x 18446744073709551615\nproperty double a\n{vertices}");
-    let mut list = ply("binary_little_endian", &faces.replace("18446744073709551615", "1"));
-    list.extend([255; 40]);
-    let mut stl = vec![0; 84];
-    stl[80..84].copy_from_slice(&[255; 4]);
-    stl.extend([0; 60]);
-    for (name, bytes) in [
-        ("a.ply", ply("binary_little_endian", &vertices)),
-        ("a.ply", ply("ascii", &vertices)),
-        ("a.ply", ply("binary_big_endian", &faces)),
-        ("a.ply", ply("binary_little_endian", &others)),
-        ("a.ply", list),
-        ("a.stl", stl),
-        ("a.off", b"OFF 18446744073709551615 18446744073709551615 0\n0 0 0\n".to_vec()),
-        ("a.off", b"OFF 1 1 0\n0 0 0\n4294967295 0 0 0\n".to_vec()),
-    ] {
-        assert!(matches!(read_bytes(name, &bytes), Err(IoError::Unreadable { .. })), "{name}");
-    }
-    let nothing = "element x 18446744073709551615\nelement face 0\n";
-    assert_eq!(read_bytes("a.ply", &ply("ascii", nothing)).expect("readable").batch.len(), 0);
-}
-
-#[test]
-fn a_polygon_beyond_the_limit_is_refused_by_name() {
-    let face = " 0".repeat(MOST_CORNERS + 1);
-    let off = format!("OFF 1 1 0\n0 0 0\n{}{face}\n", MOST_CORNERS + 1);
-    assert!(matches!(read_bytes("a.off", off.as_bytes()), Err(IoError::TooMany { .. })));
 }
 
 #[test]

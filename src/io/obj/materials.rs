@@ -11,10 +11,11 @@ use std::path::{Component, Path, PathBuf};
 use crate::io::error::IoError;
 use crate::io::input::Input;
 use crate::io::names::Names;
-use crate::io::words::{Dialect, Words, parse_number};
+use crate::io::numbers::parse_number;
+use crate::io::words::{Dialect, Words};
 use crate::mesh::Material;
 
-/// Further materials of a file's libraries have no properties.
+/// The most materials in the libraries of one file.
 const MOST_DEFINITIONS: usize = 1 << 20;
 
 /// What the libraries of a file define, by name.
@@ -69,35 +70,26 @@ impl Library {
     }
 
     fn load_file(&mut self, path: &Path) -> Result<(), IoError> {
-        // A library that cannot be opened costs its materials' properties, never the model.
+        // A library that cannot be read costs its materials' properties, never the model.
         let Ok(input) = Input::open(path, 0) else { return Ok(()) };
         let mut words = Words::new(input, Dialect::Comments);
-        let mut text = String::new();
-        loop {
-            let line = match read_line(&mut words) {
-                Ok(Some(line)) => line,
-                Ok(None) | Err(IoError::Unreadable { .. }) => break,
-                Err(error) => return Err(error),
-            };
-            if line.starts_with("newmtl ") {
-                self.define(&text);
-                text.clear();
+        let mut lines = Lines::default();
+        while let Ok(Some((keyword, line))) = read_line(&mut words) {
+            if keyword == Keyword::Name {
+                self.define(path, &std::mem::take(&mut lines).concat())?;
             }
-            // The last of several equal lines counts, so old ones need not be kept.
-            if text.len() < 16 << 10 {
-                text.push_str(&line);
-            }
+            // The last of several equal statements counts.
+            lines[keyword as usize] = line;
         }
-        self.define(&text);
-        Ok(())
+        self.define(path, &lines.concat())
     }
 
     /// Adds the material of a text that holds one.
-    fn define(&mut self, text: &str) {
-        let Ok((materials, _)) = tobj::load_mtl_buf(&mut text.as_bytes()) else { return };
+    fn define(&mut self, path: &Path, text: &str) -> Result<(), IoError> {
+        let Ok((materials, _)) = tobj::load_mtl_buf(&mut text.as_bytes()) else { return Ok(()) };
         for material in materials {
             if self.defined.len() >= MOST_DEFINITIONS {
-                return;
+                return Err(IoError::too_many(path, "materials", MOST_DEFINITIONS as u64));
             }
             let opaque = material.dissolve.unwrap_or(1.0) >= 1.0;
             let tr = material.unknown_param.get("Tr").and_then(|tr| tr.parse::<f64>().ok());
@@ -108,36 +100,48 @@ impl Library {
             };
             self.defined.insert(material.name.clone(), material);
         }
+        Ok(())
     }
 }
 
-/// The next line that `tobj` shall see, in its words; empty for all others.
-fn read_line(words: &mut Words) -> Result<Option<String>, IoError> {
-    let keyword = match words.word()? {
-        None => return Ok(None),
-        Some(b"newmtl") => "newmtl",
-        Some(b"Kd") => "Kd",
-        Some(b"d") => "d",
-        Some(b"Tr") => "Tr",
-        Some(_) => {
-            words.skip_line()?;
-            return Ok(Some(String::new()));
+/// A statement that `tobj` shall see.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Keyword {
+    Name,
+    Diffuse,
+    Dissolve,
+    Transparency,
+}
+
+/// The statements of one material, by keyword.
+type Lines = [String; 4];
+
+/// The next statement for `tobj`, in its words; `None` at the end of the file.
+fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
+    loop {
+        let (keyword, needed) = match words.word()? {
+            None => return Ok(None),
+            Some(b"newmtl") => (Keyword::Name, 0),
+            Some(b"Kd") => (Keyword::Diffuse, 3),
+            Some(b"d") => (Keyword::Dissolve, 1),
+            Some(b"Tr") => (Keyword::Transparency, 1),
+            Some(_) => {
+                words.skip_line()?;
+                continue;
+            }
+        };
+        if keyword == Keyword::Name {
+            return Ok(Some((keyword, format!("newmtl {}\n", words.name()?))));
         }
-    };
-    if keyword == "newmtl" {
-        let name = words.name()?;
-        let known = !name.is_empty();
-        return Ok(Some(if known { format!("newmtl {name}\n") } else { String::new() }));
+        let mut numbers = Vec::new();
+        while let Some(word) = words.word_on_line()? {
+            // `d -halo 0.5` has a word in front of its number.
+            numbers.extend(parse_number(word).filter(|_| numbers.len() < needed));
+        }
+        if numbers.len() == needed {
+            let numbers: Vec<_> = numbers.iter().map(f64::to_string).collect();
+            let word = ["newmtl", "Kd", "d", "Tr"][keyword as usize];
+            return Ok(Some((keyword, format!("{word} {}\n", numbers.join(" ")))));
+        }
     }
-    let mut numbers = Vec::new();
-    while let Some(word) = words.word_on_line()? {
-        // `d -halo 0.5` has a word in front of its number.
-        numbers.extend(parse_number(word).filter(|_| numbers.len() < 3));
-    }
-    let needed = if keyword == "Kd" { 3 } else { 1 };
-    if numbers.len() < needed {
-        return Ok(Some(String::new()));
-    }
-    let numbers: Vec<_> = numbers[..needed].iter().map(f64::to_string).collect();
-    Ok(Some(format!("{keyword} {}\n", numbers.join(" "))))
 }

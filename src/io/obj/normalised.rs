@@ -10,9 +10,9 @@ use std::io::{BufRead, Read};
 
 use crate::io::error::IoError;
 use crate::io::input::Input;
+use crate::io::numbers::{push_count, push_number};
 use crate::io::obj::materials::Library;
 use crate::io::obj::statements::{CornerIndices, Statement, Vertex, read_texture, resolve};
-use crate::io::output::{push_count, push_number};
 use crate::io::polygon::WHITE;
 use crate::io::words::{Dialect, Words};
 

@@ -6,7 +6,8 @@
 use std::path::Path;
 
 use crate::io::error::IoError;
-use crate::io::output::{Aside, Output, push_count, push_number};
+use crate::io::numbers::{push_count, push_number};
+use crate::io::output::{Aside, Output};
 use crate::mesh::{MeshSink, SinkStats};
 use crate::store::Scratch;
 

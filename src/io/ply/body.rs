@@ -5,6 +5,9 @@ use crate::io::input::Input;
 use crate::io::ply::header::{Element, Encoding, Scalar};
 use crate::io::words::Words;
 
+/// The most numbers that are decoded at a time; they fit the smallest buffer.
+const MOST_NUMBERS: u64 = 256;
+
 /// The elements of a PLY file as a stream of numbers.
 #[derive(Debug)]
 pub(crate) enum Body {
@@ -60,13 +63,39 @@ impl Body {
         }
     }
 
+    /// Replaces `numbers` by the next `count`, or by the first part of them.
+    #[inline]
+    pub(crate) fn numbers(
+        &mut self,
+        scalar: Scalar,
+        count: u64,
+        numbers: &mut Vec<f64>,
+    ) -> Result<(), IoError> {
+        let count = count.min(MOST_NUMBERS) as usize;
+        numbers.clear();
+        match self {
+            Self::Text { words, .. } => {
+                for _ in 0..count {
+                    numbers.push(words.number("a number")?);
+                }
+            }
+            Self::Binary { input, big_endian, .. } => {
+                let size_bytes = scalar.size_bytes();
+                let bytes = input.bytes(count * size_bytes, "a list of numbers")?;
+                let decoded = bytes.chunks_exact(size_bytes);
+                numbers.extend(decoded.map(|bytes| decode(bytes, scalar, *big_endian)));
+            }
+        }
+        Ok(())
+    }
+
     /// The length of a list whose entries are still in the file.
     pub(crate) fn length(&mut self, length: Scalar, entry: Scalar) -> Result<u64, IoError> {
         let number = self.number(length)?;
-        if !(number >= 0.0 && number <= f64::from(u32::MAX) && number.fract() == 0.0) {
+        if f64::from(number as u32) != number {
             return Err(self.unreadable("the length of a list", &number.to_string()));
         }
-        let count = number as u64;
+        let count = u64::from(number as u32);
         if let Self::Binary { input, .. } = self {
             let needed_bytes = count * entry.size_bytes() as u64;
             if needed_bytes > input.size_bytes().saturating_sub(input.offset()) {

@@ -34,6 +34,7 @@ pub(crate) struct PlyReader {
     strip: Strip,
     strip_scalar: Scalar,
     is_wild: bool,
+    indices: Vec<f64>,
     polygons: u64,
     polygon: PolygonCutter,
     discarded: Discarded,
@@ -65,6 +66,7 @@ impl PlyReader {
             strip: Strip::default(),
             strip_scalar: Scalar::I32,
             is_wild: false,
+            indices: Vec::new(),
             polygons: 0,
             polygon: PolygonCutter::new(columns),
             discarded: Discarded::default(),
@@ -195,16 +197,23 @@ impl PlyReader {
 
     /// Reads the corners of a face, and remembers whether one of them leads nowhere.
     fn read_corners(&mut self, scalar: Scalar, count: u64) -> Result<(), IoError> {
-        for _ in 0..count {
-            let index = self.body.number(scalar)?;
-            match checked_index(index, self.positions.len()) {
-                Some(vertex) => self.push_corner(vertex)?,
-                None => self.is_wild = true,
+        let mut left = count;
+        while left > 0 {
+            let mut indices = std::mem::take(&mut self.indices);
+            self.body.numbers(scalar, left, &mut indices)?;
+            left -= indices.len() as u64;
+            for &index in &indices {
+                match checked_index(index, self.positions.len()) {
+                    Some(vertex) => self.push_corner(vertex)?,
+                    None => self.is_wild = true,
+                }
             }
+            self.indices = indices;
         }
         Ok(())
     }
 
+    #[inline]
     fn push_corner(&mut self, vertex: u32) -> Result<(), IoError> {
         let position = self.positions.get(u64::from(vertex))?;
         let colour = match &mut self.colours {

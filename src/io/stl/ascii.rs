@@ -56,6 +56,11 @@ impl AsciiStlReader {
                     return Err(self.words.unreadable(KEYWORD, "the end of the file"));
                 }
                 None => return Ok(false),
+                Some(Keyword::Solid | Keyword::EndSolid | Keyword::Facet)
+                    if self.polygon.len() > 0 =>
+                {
+                    return Err(self.words.unreadable("endfacet", "the next facet or solid"));
+                }
                 Some(Keyword::Solid) => {
                     self.in_solid = true;
                     self.words.skip_line()?;
@@ -64,10 +69,7 @@ impl AsciiStlReader {
                     self.in_solid = false;
                     self.words.skip_line()?;
                 }
-                Some(Keyword::Facet) => {
-                    self.polygon.clear();
-                    self.read_normal()?;
-                }
+                Some(Keyword::Facet) => self.read_normal()?,
                 Some(Keyword::Vertex) => {
                     let mut position = [0.0; 3];
                     for coordinate in &mut position {

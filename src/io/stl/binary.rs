@@ -29,7 +29,7 @@ pub(crate) fn facets_by_size(header: &[u8], size_bytes: u64) -> Option<Facets> {
     let count = u32::from_le_bytes(header.get(80..84)?.try_into().ok()?);
     let body_bytes = size_bytes.checked_sub(HEADER_BYTES as u64)?;
     let (held, rest) = (body_bytes / FACET_BYTES as u64, body_bytes % FACET_BYTES as u64);
-    let unpatched = count == 0 && rest == 0;
+    let unpatched = count == 0 && rest == 0 && held <= u64::from(u32::MAX);
     let count = if unpatched { held } else { u64::from(count) };
     (count <= held).then_some(Facets { count, exact: count == held && rest == 0 && !unpatched })
 }
