@@ -1,2 +1,9 @@
-//! brickmend
-fn main() {}
+//! The command line of brickmend.
+
+use std::process::ExitCode;
+
+mod cli;
+
+fn main() -> ExitCode {
+    cli::run()
+}

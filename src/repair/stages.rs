@@ -9,7 +9,7 @@ use crate::contour::{ContourOptions, ContourStats, place_vertices, write_surface
 use crate::ingest::{
     Bins, DropRecord, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup, settle,
 };
-use crate::io::{CoordinateType, Format, ReadOptions};
+use crate::io::{CoordinateType, Format, IoError, ReadOptions};
 use crate::monitor::{Counter, Monitor, Recording, Stage};
 use crate::octree::{BrickKey, Domain, Flips};
 use crate::patch::{PatchStats, patch};
@@ -74,11 +74,7 @@ fn run_key(input: &Path, settings: &Settings) -> Result<[u8; 32], RepairError> {
         Ok(hasher)
     };
     let mut hasher = read().map_err(|source| {
-        RepairError::Input(crate::io::IoError::Io {
-            doing: "read",
-            path: input.to_path_buf(),
-            source,
-        })
+        RepairError::Input(IoError::Input { doing: "read", path: input.to_path_buf(), source })
     })?;
     hasher.update(serde_json::to_string(settings).unwrap_or_default().as_bytes());
     hasher.update(env!("CARGO_PKG_VERSION").as_bytes());

@@ -30,6 +30,10 @@ impl ObjWriter {
 impl MeshSink for ObjWriter {
     type Error = IoError;
 
+    fn needs_corners(&self) -> bool {
+        false
+    }
+
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
         self.vertices += positions.len() as u64;
         for position in positions {

@@ -36,6 +36,10 @@ impl PlyWriter {
 impl MeshSink for PlyWriter {
     type Error = IoError;
 
+    fn needs_corners(&self) -> bool {
+        false
+    }
+
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
         self.vertices += positions.len() as u64;
         for position in positions {

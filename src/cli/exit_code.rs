@@ -1,0 +1,57 @@
+//! What the process says when it ends; every code is documented in the help of the commands.
+
+use brickmend::repair::{Blame, RepairError};
+use std::process::ExitCode;
+
+/// The end of the process.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// All done.
+    Success = 0,
+    /// A bug of ours, which includes a failed proof.
+    Internal = 1,
+    /// The command line asks for what cannot be.
+    Usage = 2,
+    /// The result has no triangle.
+    NoResult = 4,
+    /// Output or scratch cannot be used.
+    Unusable = 5,
+    /// Another run holds the work folder.
+    Locked = 6,
+    /// The input cannot be read.
+    Input = 65,
+    /// Interrupted.
+    Interrupted = 130,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        Self::from(exit as u8)
+    }
+}
+
+impl From<&RepairError> for Exit {
+    fn from(error: &RepairError) -> Self {
+        match error.blame() {
+            Blame::Internal => Self::Internal,
+            Blame::Usage => Self::Usage,
+            Blame::Model => Self::NoResult,
+            Blame::Disk => Self::Unusable,
+            Blame::Lock => Self::Locked,
+            Blame::Input => Self::Input,
+            Blame::Interrupted => Self::Interrupted,
+        }
+    }
+}
+
+/// For the help of commands.
+pub const EXIT_STATUS: &str = "\
+Exit status:
+  0    done (the outcome may still ask for a look)
+  1    internal error, also a failed proof: nothing is put in place
+  2    usage, also a memory budget below the floor
+  4    the result has no triangle
+  5    output or scratch folder unusable
+  6    another run holds the work folder
+  65   the input cannot be read, or has no triangle
+  130  interrupted";

@@ -1,0 +1,52 @@
+//! The command line: arguments to settings, events to the terminal, errors to exit codes.
+
+mod exit_code;
+mod memory;
+mod progress;
+mod repair;
+
+use clap::{Parser, Subcommand};
+
+use crate::cli::progress::Chatter;
+
+/// Repairs broken 3D models: any polygon soup becomes a closed, 2-manifold, outward oriented
+/// surface, in the memory it was told to use.
+#[derive(Debug, Parser)]
+#[command(version, max_term_width = 100)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+    /// Say less: errors only.
+    #[arg(short, long, global = true)]
+    quiet: bool,
+    /// Say more; twice for every event.
+    #[arg(short, long, global = true, action = clap::ArgAction::Count, conflicts_with = "quiet")]
+    verbose: u8,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    /// Repair one model.
+    Repair(repair::RepairArguments),
+}
+
+/// Parses the command line and runs the command.
+pub fn run() -> std::process::ExitCode {
+    // A usage error leaves here with exit code 2.
+    let arguments = Arguments::parse();
+    let chatter = Chatter::new(arguments.quiet, arguments.verbose);
+    match arguments.command {
+        Command::Repair(arguments) => repair::run(&arguments, &chatter),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use clap::CommandFactory;
+
+    #[test]
+    fn the_arguments_are_consistent() {
+        Arguments::command().debug_assert();
+    }
+}

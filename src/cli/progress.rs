@@ -1,0 +1,150 @@
+//! The terminal: progress by work done, notes, and the seconds of every stage.
+//!
+//! The only home of indicatif. Bars appear on a terminal only; elsewhere one line a minute.
+
+use std::collections::BTreeMap;
+use std::io::{IsTerminal, Write};
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use brickmend::monitor::{Monitor, Stage};
+use brickmend::repair::StageReport;
+use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+
+use crate::cli::memory::cpu_seconds;
+
+/// Off a terminal, progress is told this often.
+const LINE_INTERVAL: Duration = Duration::from_secs(60);
+
+/// How much is said, and where.
+#[derive(Clone, Copy, Debug)]
+pub struct Chatter {
+    quiet: bool,
+    verbose: u8,
+    bars: bool,
+}
+
+impl Chatter {
+    pub fn new(quiet: bool, verbose: u8) -> Self {
+        Self { quiet, verbose, bars: !quiet && std::io::stderr().is_terminal() }
+    }
+
+    /// Says `text` unless told to be quiet.
+    pub fn say(self, text: &str) {
+        if !self.quiet {
+            write_line(text);
+        }
+    }
+
+    /// Says `text` when told to be verbose.
+    pub fn detail(self, text: &str) {
+        if self.verbose > 0 {
+            write_line(text);
+        }
+    }
+
+    /// Says what went wrong, always: cause after cause in one line.
+    pub fn error(self, error: &dyn std::error::Error) {
+        let mut text = format!("brickmend: {error}");
+        let mut source = error.source();
+        while let Some(cause) = source {
+            text.push_str(&format!(": {cause}"));
+            source = cause.source();
+        }
+        write_line(&text);
+    }
+}
+
+/// A closed stderr is no reason to stop working.
+fn write_line(text: &str) {
+    let _ = writeln!(std::io::stderr(), "{text}");
+}
+
+/// A monitor that draws on the terminal.
+pub struct Progress {
+    chatter: Chatter,
+    state: Mutex<State>,
+}
+
+struct State {
+    bar: ProgressBar,
+    stage: Option<(Stage, Instant, f64)>,
+    seconds: BTreeMap<Stage, StageReport>,
+    total: u64,
+    done: u64,
+    last_line: Instant,
+}
+
+impl Progress {
+    pub fn new(chatter: Chatter) -> Self {
+        let target =
+            if chatter.bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
+        let bar = ProgressBar::with_draw_target(Some(0), target);
+        let style = ProgressStyle::with_template("{msg:8} [{bar:30}] {percent:>3} % {elapsed}");
+        bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
+        let state = State {
+            bar,
+            stage: None,
+            seconds: BTreeMap::new(),
+            total: 0,
+            done: 0,
+            last_line: Instant::now(),
+        };
+        Self { chatter, state: Mutex::new(state) }
+    }
+
+    /// Seconds of every stage so far.
+    pub fn stages(&self) -> BTreeMap<Stage, StageReport> {
+        self.state().seconds.clone()
+    }
+
+    /// Takes the bar off the terminal.
+    pub fn clear(&self) {
+        self.state().bar.finish_and_clear();
+    }
+
+    fn state(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+impl Monitor for Progress {
+    fn begin(&self, stage: Stage, total: u64) {
+        let mut state = self.state();
+        state.stage = Some((stage, Instant::now(), cpu_seconds()));
+        (state.total, state.done) = (total, 0);
+        state.bar.set_length(total);
+        state.bar.set_position(0);
+        state.bar.set_message(stage.name());
+    }
+
+    fn advance(&self, done: u64) {
+        let mut state = self.state();
+        state.done += done;
+        state.bar.set_position(state.done);
+        if !self.chatter.bars && state.last_line.elapsed() >= LINE_INTERVAL {
+            state.last_line = Instant::now();
+            if let Some((stage, ..)) = state.stage
+                && state.total > 0
+            {
+                let percent = 100 * state.done.min(state.total) / state.total;
+                self.chatter.say(&format!("{}: {percent} %", stage.name()));
+            }
+        }
+    }
+
+    fn end(&self, stage: Stage) {
+        let mut state = self.state();
+        if let Some((_, start, cpu)) = state.stage.take() {
+            let seconds = start.elapsed().as_secs_f64();
+            let report = StageReport { seconds, cpu_seconds: cpu_seconds() - cpu };
+            state.seconds.insert(stage, report);
+            self.chatter.detail(&format!("{}: {seconds:.3} s", stage.name()));
+        }
+    }
+
+    fn note(&self, text: &str) {
+        let state = self.state();
+        state.bar.suspend(|| self.chatter.detail(text));
+    }
+}
