@@ -33,6 +33,7 @@ pub fn conclude(run: &Run, results: Results) -> Outcome {
     let cell_volume = findings.domain.cell_size().powi(3);
     let invented = Invented {
         patch_polygons: findings.sign.patch_crossings,
+        sheet_corners: findings.sign.sheet_corners,
         filled_volume: findings.sign.filled_cells as f64 * cell_volume,
         sealed_by_resolution_volume: findings.sign.sealed_by_resolution_cells as f64 * cell_volume,
         largest_openings: findings.patch.largest.clone(),
@@ -83,12 +84,10 @@ pub fn conclude(run: &Run, results: Results) -> Outcome {
 
 fn dropped(findings: &Findings) -> Dropped {
     let sign = &findings.sign;
-    let lost = sign.thin_edges + sign.removed_by_patch_edges;
     Dropped {
         thin_edges: sign.thin_edges,
-        removed_by_patch_edges: sign.removed_by_patch_edges,
         buried_edges: sign.buried_edges,
-        share_of_surface: lost as f64 / findings.scan.hit_edges.max(1) as f64,
+        share_of_surface: sign.thin_edges as f64 / findings.scan.hit_edges.max(1) as f64,
     }
 }
 
@@ -106,15 +105,19 @@ fn reasons(
         let lost = (1.0 - area_ratio) * 100.0;
         reasons.push(format!(
             "{lost:.0} % of the input's area is not in the output: of the grid edges that \
-             triangles cross, {} are thinner than a cell, {} lie on open sheets that enclose \
-             nothing, {} are inside of the solid",
-            dropped.thin_edges, dropped.removed_by_patch_edges, dropped.buried_edges
+             triangles cross, {} belong to walls thinner than a cell, {} are inside of the solid",
+            dropped.thin_edges, dropped.buried_edges
         ));
     } else if dropped.share_of_surface > LOST_AREA_SHARE {
         let share = dropped.share_of_surface * 100.0;
         reasons.push(format!(
-            "{share:.0} % of the grid edges that triangles cross are thinner than a cell or lie on \
-             open sheets"
+            "{share:.0} % of the grid edges that triangles cross belong to walls thinner than a cell"
+        ));
+    }
+    if invented.sheet_corners > 0 {
+        reasons.push(format!(
+            "Open sheets became plates of about a cell: {} corners of the grid lie behind them",
+            invented.sheet_corners
         ));
     }
     if invented.filled_volume > FILLED_VOLUME_SHARE * proof.volume {

@@ -66,6 +66,8 @@ pub struct Found {
 pub struct Invented {
     /// Polygons of the output that lie on patches.
     pub patch_polygons: u64,
+    /// Corners of the grid made inside behind open sheets, which became plates of about a cell.
+    pub sheet_corners: u64,
     /// Volume inside by the fill rule and outside by parity, cubic model units.
     pub filled_volume: f64,
     /// Part of that volume that only the resolution seals.
@@ -79,8 +81,6 @@ pub struct Invented {
 pub struct Dropped {
     /// Surface thinner than a cell.
     pub thin_edges: u64,
-    /// Surface that a patch ran along, and so removed: free sheets and fins.
-    pub removed_by_patch_edges: u64,
     /// Surface inside of the solid.
     pub buried_edges: u64,
     /// Share of all hit edges that none of the output's polygons stand for, 0..1.

@@ -272,8 +272,8 @@ impl Run<'_> {
         } else {
             format!(
                 "of {} grid edges that triangles cross, {} belong to walls thinner than a cell \
-                 ({cell}) and {} to open sheets that enclose nothing",
-                findings.scan.hit_edges, sign.thin_edges, sign.removed_by_patch_edges
+                 ({cell})",
+                findings.scan.hit_edges, sign.thin_edges
             )
         };
         RepairError::EmptyResult { path: self.input.to_path_buf(), reason }

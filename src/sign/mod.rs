@@ -13,6 +13,7 @@ mod graph;
 mod load;
 mod parity;
 mod relabel;
+mod sheets;
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +21,8 @@ use crate::monitor::Monitor;
 use crate::octree::{BrickError, BrickIndex, Domain, Flips};
 use crate::sign::graph::{RegionGraph, build_graph};
 use crate::sign::parity::base_parities;
-use crate::sign::relabel::relabel;
+use crate::sign::relabel::{Decisions, relabel};
+use crate::sign::sheets::find_sheets;
 use crate::store::{BrickFile, Resources, StoreError};
 
 /// Name of the brick file that sign generation leaves.
@@ -78,8 +80,8 @@ pub struct SignStats {
     pub sealed_by_resolution_cells: u64,
     /// Edges with hits whose both ends are outside: features thinner than a cell.
     pub thin_edges: u64,
-    /// Odd edges that a patch flipped back: surface that the patch runs along, and so removes.
-    pub removed_by_patch_edges: u64,
+    /// Corners made inside behind open sheets, which became plates of about a cell.
+    pub sheet_corners: u64,
     /// Edges with hits whose both ends are inside: surface hidden in the solid.
     pub buried_edges: u64,
 }
@@ -94,7 +96,7 @@ impl SignStats {
         self.filled_cells += other.filled_cells;
         self.sealed_by_resolution_cells += other.sealed_by_resolution_cells;
         self.thin_edges += other.thin_edges;
-        self.removed_by_patch_edges += other.removed_by_patch_edges;
+        self.sheet_corners += other.sheet_corners;
         self.buried_edges += other.buried_edges;
     }
 }
@@ -114,10 +116,12 @@ pub fn assign_signs(
     let keys = graph.bricks.iter().map(|brick| brick.key).collect();
     let index = BrickIndex::new(keys, domain.bricks_per_side());
     let parities = base_parities(&graph.bricks);
-    let exterior = graph.flood(&index, resources)?;
+    let mut exterior = graph.flood(&index, resources)?;
     let regions = graph.region_count();
     let RegionGraph { bricks, .. } = graph;
-    let (file, mut stats) = relabel(hits, flips, rule, &bricks, &parities, exterior, resources)?;
+    let sheets = find_sheets(hits, flips, &bricks, &mut exterior, resources)?;
+    let decisions = Decisions { rule, bricks: &bricks, parities: &parities, sheets: &sheets };
+    let (file, mut stats) = relabel(hits, flips, &decisions, exterior, resources)?;
     stats.regions = regions;
     note_fill(&stats, resources.monitor);
     Ok((file, stats))

@@ -1,7 +1,5 @@
 //! Turns regions into signs and marks, and picks the crossing of every marked edge.
 
-use std::iter::Peekable;
-
 use crate::octree::{
     ArchivedHitBrick, CornerBits, Crossing, EdgeBits, FlipRecord, Flips, HitEdge, LINES, NO_PLANE,
     PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_hits, edge_position, encode,
@@ -9,6 +7,7 @@ use crate::octree::{
 };
 use crate::sign::graph::{Exterior, GraphBrick};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
+use crate::sign::sheets::Sheets;
 use crate::sign::{FillRule, SIGNS, SignError, SignStats};
 use crate::store::{BrickFile, BrickWriter, Resources, ordered};
 
@@ -31,26 +30,41 @@ struct Relabelled {
     stats: SignStats,
 }
 
+/// What is known before the signs are written.
+pub struct Decisions<'d> {
+    /// What counts as inside.
+    pub rule: FillRule,
+    /// The bricks with hits or flips.
+    pub bricks: &'d [GraphBrick],
+    /// Parity of their min corners.
+    pub parities: &'d [bool],
+    /// Corners behind sheets.
+    pub sheets: &'d Sheets,
+}
+
 /// Writes the signs of all bricks.
 pub fn relabel(
     hits: &BrickFile,
     flips: &Flips,
-    rule: FillRule,
-    bricks: &[GraphBrick],
-    parities: &[bool],
+    decisions: &Decisions,
     mut exterior: Exterior,
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
     let mut writer = BrickWriter::create(resources.scratch, SIGNS, resources.backing)?;
     let mut stats = SignStats::default();
-    let mut items = LoadItems::new(hits, flips, resources);
+    let mut items = LoadItems::new(hits, flips, Some(decisions.sheets), resources);
     let mut number = 0;
     ordered(
         resources.pool,
         || {
             let Some(load) = items.next()? else { return Ok(None) };
-            let brick = &bricks[number];
-            let base_parity = parities[number];
+            let known = decisions.bricks.get(number).filter(|brick| brick.key == load.brick.0);
+            let Some(brick) = known else {
+                // Empty space that a sheet's corner touches: the sheet was reached from outside.
+                let verdicts = vec![Verdict { exterior: true, sealed_by_resolution: false }];
+                return Ok(Some(RelabelItem { load, base_parity: false, verdicts }));
+            };
+            let base_parity = decisions.parities[number];
             number += 1;
             let first = brick.first_region;
             let verdicts = (first..first + u32::from(brick.regions))
@@ -64,7 +78,7 @@ pub fn relabel(
             Ok(Some(RelabelItem { load, base_parity, verdicts }))
         },
         Workspace::default,
-        |space, item| space.relabel(hits, &item, rule),
+        |space, item| space.relabel(hits, &item, decisions.rule),
         |done: Relabelled| {
             stats.add(&done.stats);
             resources.monitor.advance(1);
@@ -101,8 +115,10 @@ impl Workspace {
         }
         self.parity.from_marks(&self.loaded.marks, item.base_parity);
         self.set_signs(&regions, item, rule)?;
+        let sheet_corners = self.add_sheets(&item.load.sheet_corners);
         self.marks.set_differences(&self.signs);
         let mut stats = self.count();
+        stats.sheet_corners = sheet_corners;
         let brick = self.pick_crossings(record, &item.load.flips, &mut stats);
         stats.bricks = u64::from(!brick.crossings.is_empty());
         let bytes = encode(&brick);
@@ -131,6 +147,17 @@ impl Workspace {
             self.sealed.rows[row] = sealed;
         }
         Ok(())
+    }
+
+    /// Makes the corners behind sheets inside; how many of them the brick owns.
+    fn add_sheets(&mut self, corners: &[u32]) -> u64 {
+        let mut owned = 0;
+        for &corner in corners {
+            let (row, x) = (corner as usize / LINES, corner as usize % LINES);
+            self.signs.rows[row] |= 1 << x;
+            owned += u64::from(x < SIDE && row % LINES < SIDE && row / LINES < SIDE);
+        }
+        owned
     }
 
     /// Counts corners that the brick owns, and leaf cells.
@@ -166,7 +193,7 @@ impl Workspace {
         let owned = |edge: u32| edge_position(edge).1.iter().all(|&c| c < SIDE);
         self.marks.for_each(|edge| {
             while let Some((passed, _)) = hit_edges.next_below(edge) {
-                self.count_unmarked(passed, owned(passed), &mut flips, stats);
+                self.count_unmarked(passed, owned(passed), stats);
             }
             while flips.next_if(|flip| flip.edge < edge).is_some() {}
             let patch = flips.next_if(|flip| flip.edge == edge).map(|flip| flip.offset);
@@ -177,7 +204,8 @@ impl Workspace {
                 // Seen from outside: the last hit when the lower end is inside, else the first.
                 (Some(hits), _) => planes.pick(if up { hits[hits.len() - 1] } else { hits[0] }),
                 (None, Some(offset)) => PATCH | u32::from(offset),
-                (None, None) => unreachable!("a marked edge has a hit or a flip"),
+                // The far side of a plate that was a sheet.
+                (None, None) => PATCH | 1 << 15,
             };
             if owned(edge) {
                 stats.crossings += 1;
@@ -186,27 +214,18 @@ impl Workspace {
             brick.crossings.push(Crossing { edge, plane });
         });
         while let Some((passed, _)) = hit_edges.next_below(u32::MAX) {
-            self.count_unmarked(passed, owned(passed), &mut flips, stats);
+            self.count_unmarked(passed, owned(passed), stats);
         }
         brick.planes = planes.finish(&mut brick.crossings);
         brick
     }
 
     /// Counts an edge with hits whose two ends ended up alike.
-    fn count_unmarked<'f>(
-        &self,
-        edge: u32,
-        owned: bool,
-        flips: &mut Peekable<impl Iterator<Item = &'f FlipRecord>>,
-        stats: &mut SignStats,
-    ) {
-        while flips.next_if(|flip| flip.edge < edge).is_some() {}
-        let flipped = flips.next_if(|flip| flip.edge == edge).is_some();
+    fn count_unmarked(&self, edge: u32, owned: bool, stats: &mut SignStats) {
         if owned {
             let inside = self.signs.get(edge_position(edge).1);
             stats.buried_edges += u64::from(inside);
-            stats.removed_by_patch_edges += u64::from(!inside && flipped);
-            stats.thin_edges += u64::from(!inside && !flipped);
+            stats.thin_edges += u64::from(!inside);
         }
     }
 }

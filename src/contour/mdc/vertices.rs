@@ -177,7 +177,9 @@ impl Workspace {
         let first = brick.positions.len();
         for component in 0..components.count {
             let edges = components.edge_masks[usize::from(component)];
-            let (position, clamped) = self.place_component(at, edges, &brick.positions[first..]);
+            let alone = components.count == 1;
+            let taken = &brick.positions[first..];
+            let (position, clamped) = self.place_component(at, edges, alone, taken);
             brick.positions.push(position);
             stats.clamped_vertices += u64::from(clamped);
         }
@@ -247,7 +249,13 @@ impl Workspace {
     }
 
     /// The vertex of one component, in units from the brick's min corner; whether it was clamped.
-    fn place_component(&self, at: [usize; 3], edges: u16, taken: &[[i32; 3]]) -> ([i32; 3], bool) {
+    fn place_component(
+        &self,
+        at: [usize; 3],
+        edges: u16,
+        alone: bool,
+        taken: &[[i32; 3]],
+    ) -> ([i32; 3], bool) {
         let mut hits = [Hit { point: DVec3::ZERO, normal: DVec3::ZERO }; 12];
         let mut count = 0;
         let mut outward = DVec3::ZERO;
@@ -265,9 +273,25 @@ impl Workspace {
             outward += crossing.normal;
             count += 1;
         }
-        let solution = solve(&hits[..count], &self.qef);
+        let hits = &hits[..count];
+        let solution =
+            if alone { solve(hits, &self.qef) } else { solve(hits, &self.within_crossings(hits)) };
         let position = self.to_lattice(at, solution.position);
         (self.apart_from(position, at, outward, taken), solution.clamped)
+    }
+
+    /// Where several components share a cell, each stays in the box of its own crossings: there
+    /// they cannot pass one another.
+    fn within_crossings(&self, hits: &[Hit]) -> QefOptions {
+        let first = hits[0].point;
+        let (lo, hi) = hits
+            .iter()
+            .fold((first, first), |(lo, hi), hit| (lo.min(hit.point), hi.max(hit.point)));
+        let QefOptions { lo: cell_lo, hi: cell_hi, .. } = self.qef;
+        let mut options = self.qef;
+        options.lo = lo.clamp(cell_lo, cell_hi);
+        options.hi = hi.clamp(cell_lo, cell_hi);
+        options
     }
 
     /// Rounds to the lattice, strictly inside the cell.

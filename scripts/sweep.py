@@ -1,0 +1,76 @@
+#!/usr/bin/env python3
+"""Repairs every model below a folder and prints one table row per model.
+
+    scripts/sweep.py MODELS OUT [--brickmend BIN] [--judge 'COMMAND {out}'] [-- REPAIR ARGUMENTS]
+
+The row tells exit code, seconds, peak memory, triangles, area and volume in and out, and the
+verdict's reasons. With --judge, COMMAND is run on every output; what it prints (JSON) is kept
+beside the output as NAME.judge.json.
+"""
+
+import argparse
+import json
+import pathlib
+import shlex
+import subprocess
+import sys
+import time
+
+ENDINGS = {".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".3mf"}
+
+
+def repair(binary, model, output, extra):
+    """One model: exit code, seconds, outcome or the error message."""
+    start = time.monotonic()
+    command = [binary, "repair", str(model), "-o", str(output), "--json", *extra]
+    run = subprocess.run(command, capture_output=True, text=True, check=False)
+    seconds = time.monotonic() - start
+    outcome = json.loads(run.stdout) if run.returncode == 0 else None
+    return run.returncode, seconds, outcome, run.stderr.strip()
+
+
+def row(name, code, seconds, outcome, message):
+    """A line of the table."""
+    if outcome is None:
+        return f"| {name} | {code} | {seconds:.2f} | | | | | | | {message} |"
+    proof, soup = outcome["output"]["proof"], outcome["input"]
+    peak = (outcome["memory"]["peak_bytes"] or 0) / 2**20
+    return (
+        f"| {name} | {code} | {seconds:.2f} | {peak:.0f} | {outcome['grid']['depth']} "
+        f"| {proof['triangles']} | {soup['area']:.5g} → {proof['area']:.5g} "
+        f"| {soup['signed_volume']:.5g} → {proof['volume']:.5g} "
+        f"| {outcome['output']['area_ratio']:.3f} | {'; '.join(outcome['reasons'])} |"
+    )
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", 1)[0])
+    parser.add_argument("models", type=pathlib.Path)
+    parser.add_argument("out", type=pathlib.Path)
+    parser.add_argument("--brickmend", default="target/release/brickmend")
+    parser.add_argument("--judge", help="command to run on every output, {out} is its path")
+    parser.add_argument("--format", default="ply")
+    parser.add_argument("--only", default="", help="names that contain this")
+    parser.add_argument("extra", nargs="*", help="arguments for repair, after --")
+    arguments = parser.parse_args()
+    arguments.out.mkdir(parents=True, exist_ok=True)
+    print("| model | exit | s | MiB | depth | triangles | area in → out | volume in → out | ratio | look |")
+    print("|---|---|---|---|---|---|---|---|---|---|")
+    failures = 0
+    for model in sorted(p for p in arguments.models.rglob("*") if p.suffix.lower() in ENDINGS):
+        if arguments.only not in model.name:
+            continue
+        output = arguments.out / f"{model.stem}.{arguments.format}"
+        output.unlink(missing_ok=True)
+        code, seconds, outcome, message = repair(arguments.brickmend, model, output, arguments.extra)
+        failures += code not in (0, 65)
+        print(row(model.name, code, seconds, outcome, message), flush=True)
+        if arguments.judge and output.exists():
+            judge = [part.format(out=output) for part in shlex.split(arguments.judge)]
+            verdict = subprocess.run(judge, capture_output=True, text=True, check=False).stdout
+            output.with_suffix(".judge.json").write_text(verdict)
+    sys.exit(1 if failures else 0)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,172 @@
+//! Open sheets that the patch runs along become plates of about a cell.
+//!
+//! A patch that closes a flat sheet lies in the sheet itself: the marks cancel, and the surface
+//! would be gone without a word. The corners just behind it are made inside instead: its visible
+//! side stays where it was, and the result is closed because signs are a function of corners.
+//!
+//! In:      bricks in which a patch flipped an odd edge, and what the flood reaches.
+//! Out:     corners to be made inside, for every brick that holds them.
+//! Memory:  the share; the corners are sorted externally.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::octree::Flips;
+use crate::octree::{BrickKey, LINES, ROWS, SIDE, edge_position, find_regions};
+use crate::sign::SignError;
+use crate::sign::graph::{Exterior, GraphBrick};
+use crate::sign::load::{LoadItem, LoadItems, Loaded};
+use crate::store::{
+    BrickFile, Record, Resources, Sorter, Spool, SpoolReader, SpoolWriter, StoreError, ordered,
+};
+
+/// A corner of a brick that is inside because a sheet passes in front of it. 16 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct SheetCorner {
+    /// Key of the brick.
+    pub brick: u64,
+    /// Number of the corner in the brick: x + 33y + 1089z.
+    pub corner: u32,
+    /// Zero.
+    pub unused: u32,
+}
+
+impl Record for SheetCorner {
+    type Key = (u64, u32);
+    fn key(&self) -> Self::Key {
+        (self.brick, self.corner)
+    }
+}
+
+/// Corners behind sheets, by brick.
+pub struct Sheets {
+    spool: Spool<SheetCorner>,
+}
+
+struct SheetItem {
+    load: LoadItem,
+    exterior: Vec<bool>,
+}
+
+/// Finds the corners behind all sheets that nothing else makes inside.
+pub fn find_sheets(
+    hits: &BrickFile,
+    flips: &Flips,
+    bricks: &[GraphBrick],
+    exterior: &mut Exterior,
+    resources: &Resources,
+) -> Result<Sheets, SignError> {
+    let mut corners = Sorter::<SheetCorner>::new(resources.scratch, resources.share_bytes / 4);
+    let mut items = LoadItems::new(hits, flips, None, resources);
+    let mut number = 0;
+    ordered(
+        resources.pool,
+        || {
+            while let Some(load) = items.next()? {
+                let brick = &bricks[number];
+                number += 1;
+                if brick.has_sheet {
+                    let first = brick.first_region;
+                    let exterior = (first..first + u32::from(brick.regions))
+                        .map(|region| exterior.reaches(region))
+                        .collect::<Result<_, StoreError>>()?;
+                    return Ok(Some(SheetItem { load, exterior }));
+                }
+            }
+            Ok::<_, SignError>(None)
+        },
+        Loaded::default,
+        |loaded, item| {
+            loaded.load(hits, &item.load)?;
+            Ok(corners_behind(loaded, &item))
+        },
+        |found: Vec<SheetCorner>| Ok(corners.extend(&found)?),
+    )?;
+    let mut spool = SpoolWriter::create(resources.scratch, "sheets.spool")?;
+    let mut sorted = corners.finish()?;
+    let mut last = None;
+    while let Some(corner) = sorted.next()? {
+        if last != Some(corner) {
+            spool.push(corner)?;
+            last = Some(corner);
+        }
+    }
+    Ok(Sheets { spool: spool.finish()? })
+}
+
+fn corners_behind(loaded: &Loaded, item: &SheetItem) -> Vec<SheetCorner> {
+    let regions = find_regions(&loaded.barrier);
+    let mut corners = Vec::new();
+    for &(edge, faces_up) in &loaded.sheet_edges {
+        let (axis, lower) = edge_position(edge);
+        let mut upper = lower;
+        upper[axis] += 1;
+        let outside = |at| item.exterior[usize::from(regions.at(at))];
+        if outside(lower) && outside(upper) {
+            let behind = if faces_up { lower } else { upper };
+            push_in_bricks(item.load.brick, behind, &mut corners);
+        }
+    }
+    corners
+}
+
+/// The corner in each of the one to eight bricks that hold it.
+fn push_in_bricks(brick: BrickKey, at: [usize; 3], corners: &mut Vec<SheetCorner>) {
+    let position = brick.position();
+    let choices = |a: usize| -> Vec<(u32, usize)> {
+        let (here, c) = (position[a], at[a]);
+        match c {
+            0 if here > 0 => vec![(here, 0), (here - 1, SIDE)],
+            SIDE => vec![(here, SIDE), (here + 1, 0)],
+            _ => vec![(here, c)],
+        }
+    };
+    for (z, lz) in choices(2) {
+        for &(y, ly) in &choices(1) {
+            for &(x, lx) in &choices(0) {
+                let corner = (lz * ROWS + ly * LINES + lx) as u32;
+                let brick = BrickKey::new([x, y, z]).0;
+                corners.push(SheetCorner { brick, corner, unused: 0 });
+            }
+        }
+    }
+}
+
+impl Sheets {
+    /// Reads the corners brick by brick.
+    pub fn by_brick(&self) -> SheetReader<'_> {
+        let reader = self.spool.reader(0, self.spool.len());
+        SheetReader { reader, block: Vec::new(), at: 0 }
+    }
+}
+
+/// Corners by ascending brick.
+pub struct SheetReader<'s> {
+    reader: SpoolReader<'s, SheetCorner>,
+    block: Vec<SheetCorner>,
+    at: usize,
+}
+
+impl SheetReader<'_> {
+    /// The brick of the next corner.
+    pub fn peek_brick(&mut self) -> Result<Option<u64>, StoreError> {
+        if self.at == self.block.len() {
+            self.block.clear();
+            self.at = 0;
+            if let Some(block) = self.reader.next_block()? {
+                self.block.extend_from_slice(block);
+            }
+        }
+        Ok(self.block.get(self.at).map(|corner| corner.brick))
+    }
+
+    /// Takes all corners of `brick`, which is not after the next brick.
+    pub fn take(&mut self, brick: u64) -> Result<Vec<u32>, StoreError> {
+        let mut corners = Vec::new();
+        while self.peek_brick()? == Some(brick) {
+            corners.push(self.block[self.at].corner);
+            self.at += 1;
+        }
+        Ok(corners)
+    }
+}
