@@ -10,6 +10,7 @@ use crate::octree::{
 };
 use crate::sign::SignError;
 use crate::sign::load::{LoadItems, Loaded};
+use crate::sign::sheets::Sheets;
 use crate::store::{
     BrickFile, Labels, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite, ordered,
 };
@@ -92,13 +93,14 @@ struct BrickSays {
     even: Vec<[u16; 2]>,
 }
 
-/// Finds the regions of all bricks.
+/// Finds the regions of all bricks; corners behind `sheets` are regions of their own.
 pub fn build_graph(
     hits: &BrickFile,
     flips: &Flips,
+    sheets: Option<&Sheets>,
     resources: &Resources,
 ) -> Result<RegionGraph, SignError> {
-    let mut items = LoadItems::new(hits, flips, None, resources);
+    let mut items = LoadItems::new(hits, flips, sheets, resources);
     let mut bricks = Vec::with_capacity(hits.len());
     let mut pieces = Sorter::<FacePiece>::new(resources.scratch, resources.share_bytes / 4);
     let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, "even.spool")?;

@@ -1,6 +1,9 @@
 //! Loads a brick with its flips: marks and barrier as bit planes.
 
-use crate::octree::{BrickKey, EdgeBits, FlipReader, FlipRecord, Flips, HitEdge, decode_hits};
+use crate::octree::{
+    BrickKey, EdgeBits, FlipReader, FlipRecord, Flips, HitEdge, SIDE, decode_hits, edge_index,
+    edge_position,
+};
 use crate::sign::SignError;
 use crate::sign::sheets::{SheetReader, Sheets};
 use crate::store::{BrickFile, Resources, StoreError, View};
@@ -88,11 +91,29 @@ impl Loaded {
             self.marks.toggle(flip.edge);
             self.barrier.set(flip.edge);
         }
+        for &corner in &item.sheet_corners {
+            self.close_around(corner);
+        }
         if !self.marks.is_closed() {
             let expected = "no odd face after patching";
             return Err(SignError::Contradiction { brick: item.brick.position(), expected });
         }
         Ok(view)
+    }
+
+    /// Nothing passes a corner behind a sheet: it is a region of its own, and inside.
+    fn close_around(&mut self, corner: u32) {
+        let (_, at) = edge_position(corner);
+        for axis in 0..3 {
+            if at[axis] < SIDE {
+                self.barrier.set(edge_index(axis, at));
+            }
+            if at[axis] > 0 {
+                let mut below = at;
+                below[axis] -= 1;
+                self.barrier.set(edge_index(axis, below));
+            }
+        }
     }
 
     /// Before the flips are applied: which of them fall on odd edges.

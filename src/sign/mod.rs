@@ -19,10 +19,10 @@ use serde::{Deserialize, Serialize};
 
 use crate::monitor::Monitor;
 use crate::octree::{BrickError, BrickIndex, Domain, Flips};
-use crate::sign::graph::{RegionGraph, build_graph};
+use crate::sign::graph::{Exterior, GraphBrick, build_graph};
 use crate::sign::parity::base_parities;
 use crate::sign::relabel::{Decisions, relabel};
-use crate::sign::sheets::find_sheets;
+use crate::sign::sheets::{Sheets, find_sheets};
 use crate::store::{BrickFile, Resources, StoreError};
 
 /// Name of the brick file that sign generation leaves.
@@ -112,19 +112,37 @@ pub fn assign_signs(
     domain: &Domain,
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
-    let mut graph = build_graph(hits, flips, resources)?;
-    let keys = graph.bricks.iter().map(|brick| brick.key).collect();
-    let index = BrickIndex::new(keys, domain.bricks_per_side());
-    let parities = base_parities(&graph.bricks);
-    let mut exterior = graph.flood(&index, resources)?;
-    let regions = graph.region_count();
-    let RegionGraph { bricks, .. } = graph;
+    let (bricks, mut exterior, mut regions) = flood(hits, flips, None, domain, resources)?;
     let sheets = find_sheets(hits, flips, &bricks, &mut exterior, resources)?;
+    let bricks = if sheets.is_empty() {
+        bricks
+    } else {
+        let again = flood(hits, flips, Some(&sheets), domain, resources)?;
+        (exterior, regions) = (again.1, again.2);
+        again.0
+    };
+    let parities = base_parities(&bricks);
     let decisions = Decisions { rule, bricks: &bricks, parities: &parities, sheets: &sheets };
     let (file, mut stats) = relabel(hits, flips, &decisions, exterior, resources)?;
     stats.regions = regions;
     note_fill(&stats, resources.monitor);
     Ok((file, stats))
+}
+
+/// Finds all regions and what the outside reaches of them.
+fn flood(
+    hits: &BrickFile,
+    flips: &Flips,
+    sheets: Option<&Sheets>,
+    domain: &Domain,
+    resources: &Resources,
+) -> Result<(Vec<GraphBrick>, Exterior, u64), SignError> {
+    let mut graph = build_graph(hits, flips, sheets, resources)?;
+    let keys = graph.bricks.iter().map(|brick| brick.key).collect();
+    let index = BrickIndex::new(keys, domain.bricks_per_side());
+    let exterior = graph.flood(&index, resources)?;
+    let regions = graph.region_count();
+    Ok((graph.bricks, exterior, regions))
 }
 
 fn note_fill(stats: &SignStats, monitor: &dyn Monitor) {

@@ -34,7 +34,7 @@ struct Relabelled {
 pub struct Decisions<'d> {
     /// What counts as inside.
     pub rule: FillRule,
-    /// The bricks with hits or flips.
+    /// The bricks with hits, flips or corners behind sheets.
     pub bricks: &'d [GraphBrick],
     /// Parity of their min corners.
     pub parities: &'d [bool],
@@ -58,12 +58,8 @@ pub fn relabel(
         resources.pool,
         || {
             let Some(load) = items.next()? else { return Ok(None) };
-            let known = decisions.bricks.get(number).filter(|brick| brick.key == load.brick.0);
-            let Some(brick) = known else {
-                // Empty space that a sheet's corner touches: the sheet was reached from outside.
-                let verdicts = vec![Verdict { exterior: true, sealed_by_resolution: false }];
-                return Ok(Some(RelabelItem { load, base_parity: false, verdicts }));
-            };
+            let brick = &decisions.bricks[number];
+            debug_assert_eq!(brick.key, load.brick.0);
             let base_parity = decisions.parities[number];
             number += 1;
             let first = brick.first_region;

@@ -2,7 +2,8 @@
 //!
 //! A patch that closes a flat sheet lies in the sheet itself: the marks cancel, and the surface
 //! would be gone without a word. The corners just behind it are made inside instead: its visible
-//! side stays where it was, and the result is closed because signs are a function of corners.
+//! side stays where it was, and the result is closed because signs are a function of corners. The
+//! outside is then flooded again, so that nothing is left hollow between plates.
 //!
 //! In:      bricks in which a patch flipped an odd edge, and what the flood reaches.
 //! Out:     corners to be made inside, for every brick that holds them.
@@ -133,6 +134,11 @@ fn push_in_bricks(brick: BrickKey, at: [usize; 3], corners: &mut Vec<SheetCorner
 }
 
 impl Sheets {
+    /// Whether there is none.
+    pub fn is_empty(&self) -> bool {
+        self.spool.is_empty()
+    }
+
     /// Reads the corners brick by brick.
     pub fn by_brick(&self) -> SheetReader<'_> {
         let reader = self.spool.reader(0, self.spool.len());

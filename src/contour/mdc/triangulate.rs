@@ -115,11 +115,11 @@ fn orientation(p: [i64; 3], q: [i64; 3], r: [i64; 3], s: [i64; 3]) -> i32 {
     let [a, b, c] = [q, r, s].map(|t| [t[0] - p[0], t[1] - p[1], t[2] - p[2]]);
     let (af, bf, cf) = (a.map(|x| x as f64), b.map(|x| x as f64), c.map(|x| x as f64));
     let (mut sum, mut size) = (0.0, 0.0);
-    for i in 0..3 {
+    for (i, along) in af.into_iter().enumerate() {
         let (j, k) = ((i + 1) % 3, (i + 2) % 3);
         let (x, y) = (bf[j] * cf[k], bf[k] * cf[j]);
-        sum += af[i] * (x - y);
-        size += af[i].abs() * (x.abs() + y.abs());
+        sum += along * (x - y);
+        size += along.abs() * (x.abs() + y.abs());
     }
     if sum.abs() > size * FILTER {
         return if sum > 0.0 { 1 } else { -1 };
