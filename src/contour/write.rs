@@ -3,7 +3,7 @@
 use crate::contour::mdc::{BrickTriangles, Polygons};
 use crate::contour::{ContourError, ContourOptions, ContourStats, Method};
 use crate::mesh::MeshSink;
-use crate::monitor::Gauge;
+use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, decode_cells};
 use crate::store::{BrickFile, Resources, StoreError, ordered};
 
@@ -95,6 +95,7 @@ where
 {
     let with_corners = sink.needs_corners();
     let mut numbers = 0..cells.len();
+    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered(
         resources.pool,
         || {
@@ -104,7 +105,10 @@ where
             Ok(numbers.next())
         },
         || Polygons::new(cells, bases, domain, with_corners),
-        |polygons, number| Ok(polygons.triangles(number)?),
+        |polygons, number| {
+            let _brick = resident.hold(1);
+            Ok(polygons.triangles(number)?)
+        },
         |mut brick: BrickTriangles| {
             brick.number_fan_points(stats.vertices as u32);
             sink.vertices(&brick.fan_points).map_err(WriteError::Sink)?;

@@ -5,6 +5,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::ingest::area::{AreaHistogram, SoupMeasure};
 use crate::ingest::soup::Soup;
 use crate::ingest::touch::for_each_touched_brick;
+use crate::monitor::{Gauge, Resident};
 use crate::octree::{BinTriangle, Domain, SoupTriangle};
 use crate::store::{Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
 
@@ -60,6 +61,7 @@ pub fn fill_bins(
     let mut histogram = AreaHistogram::new(soup.bounds);
     let mut sorter = Sorter::<BinTriangle>::new(resources.scratch, resources.share_bytes);
     let mut next = 0;
+    let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
     ordered(
         resources.pool,
         || {
@@ -69,10 +71,11 @@ pub fn fill_bins(
             let mut triangles = Vec::new();
             soup.spool.read(next, ITEM_TRIANGLES, &mut triangles)?;
             next += triangles.len() as u64;
-            Ok((!triangles.is_empty()).then_some(triangles))
+            let held = resident.hold(triangles.len());
+            Ok((!triangles.is_empty()).then_some((triangles, held)))
         },
         || (),
-        |(), triangles: Vec<SoupTriangle>| {
+        |(), (triangles, held): (Vec<SoupTriangle>, _)| {
             let mut binned = Vec::with_capacity(triangles.len() * 5 / 4);
             for triangle in &triangles {
                 let corners = triangle.corners.map(|c| domain.snap(c));
@@ -81,9 +84,9 @@ pub fn fill_bins(
                     Ok::<(), StoreError>(())
                 })?;
             }
-            Ok((triangles, binned))
+            Ok((triangles, binned, held))
         },
-        |(triangles, binned)| {
+        |(triangles, binned, _held)| {
             triangles.iter().for_each(|triangle| histogram.add(triangle));
             sorter.extend(&binned)
         },

@@ -4,8 +4,10 @@
 //! counters for tests and for the outcome. Times are stamped by the caller, never by the library.
 
 mod recording;
+mod resident;
 
 pub use recording::Recording;
+pub use resident::{Held, Resident};
 
 use serde::{Deserialize, Serialize};
 

@@ -5,6 +5,7 @@
 
 use crate::repair::RepairError;
 use crate::repair::settings::Limits;
+use crate::store::{Accountant, Lease};
 
 /// The program, its libraries, stacks and fixed buffers.
 const BASE_BYTES: u64 = 22 << 20;
@@ -14,6 +15,8 @@ const THREAD_BYTES: u64 = 8 << 20;
 const LEAST_SHARE_BYTES: u64 = 8 << 20;
 /// A mapped window, see `store`.
 const WINDOW_BYTES: u64 = 256 << 10;
+/// Brick files that are read at one time.
+const OPEN_BRICK_FILES: u64 = 2;
 /// More cached windows do not help.
 const MAX_WINDOWS: u64 = 128;
 
@@ -26,6 +29,8 @@ pub struct MemoryPlan {
     pub share_bytes: u64,
     /// Windows kept mapped per brick file.
     pub cached_windows: usize,
+    /// For the program and the threads' workspaces.
+    pub base_bytes: u64,
 }
 
 /// The smallest budget for `threads` workers.
@@ -35,6 +40,19 @@ pub fn floor_bytes(threads: usize) -> u64 {
 }
 
 impl MemoryPlan {
+    /// Takes the shares out of the budget for as long as the run lasts.
+    ///
+    /// # Errors
+    /// [`RepairError::Store`] when they do not fit, which [`MemoryPlan::within`] rules out.
+    pub fn lease(&self, accountant: &Accountant) -> Result<[Lease; 3], RepairError> {
+        let windows = OPEN_BRICK_FILES * self.cached_windows as u64 * WINDOW_BYTES;
+        Ok([
+            accountant.lease("The program and its threads", self.base_bytes)?,
+            accountant.lease("Mapped windows of bricks", windows)?,
+            accountant.lease("Sorts, tables and unions", self.share_bytes)?,
+        ])
+    }
+
     /// Shares out the budget; takes fewer threads before it refuses.
     ///
     /// # Errors
@@ -50,10 +68,13 @@ impl MemoryPlan {
             return Err(RepairError::BudgetBelowFloor { found_bytes, needed_bytes });
         }
         let free = budget - BASE_BYTES - threads as u64 * THREAD_BYTES;
-        // Two brick files may be open at a time; the rest is slack for what allocators keep.
-        let windows = (free / 8 / WINDOW_BYTES).clamp(4, MAX_WINDOWS);
+        // An eighth of what is free for windows, three quarters for sorts and tables; the rest is
+        // slack for what allocators keep.
+        let windows = (free / 8 / OPEN_BRICK_FILES / WINDOW_BYTES).clamp(2, MAX_WINDOWS);
         let share = limits.share_bytes.unwrap_or(free / 4 * 3);
-        Ok(Self { threads, share_bytes: share, cached_windows: windows as usize })
+        let base_bytes = BASE_BYTES + threads as u64 * THREAD_BYTES;
+        let cached_windows = windows as usize;
+        Ok(Self { threads, share_bytes: share, cached_windows, base_bytes })
     }
 }
 

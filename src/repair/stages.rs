@@ -21,7 +21,7 @@ use crate::repair::settings::{Depth, Limits, Settings};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, SignStats, assign_signs};
-use crate::store::{Accountant, BrickFile, Resources, SpoolReader, StoreError};
+use crate::store::{Accountant, Backing, BrickFile, Resources, SpoolReader, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
 
 /// Repairs `input` into `output`, whose format is told by its extension (PLY when it has none).
@@ -40,11 +40,11 @@ pub fn repair(
     crate::io::detect(input).map_err(RepairError::Input)?;
     let pool = start_threads(plan.threads)?;
     let recording = Recording::new(monitor);
-    let workspace = Workspace::open(output, limits.work_dir.as_deref(), run_key(input, settings)?)?;
+    let mut workspace =
+        Workspace::open(output, limits.work_dir.as_deref(), run_key(input, settings)?)?;
     let accountant = Accountant::new(limits.max_memory_bytes);
-    let mut run = Run { input, output, format, settings, plan, pool, recording, accountant };
-    let mut workspace = workspace;
-    match run.all_stages(&mut workspace, limits) {
+    let run = Run { input, output, format, settings, plan, recording, accountant };
+    match run.all_stages(&mut workspace, &pool, limits.backing) {
         Ok(outcome) => {
             workspace.put_in_place()?;
             Ok(outcome)
@@ -89,7 +89,6 @@ pub struct Run<'r> {
     pub format: Format,
     pub settings: &'r Settings,
     pub plan: MemoryPlan,
-    pool: ThreadPool,
     pub recording: Recording<'r>,
     pub accountant: Accountant,
 }
@@ -107,22 +106,19 @@ pub struct Findings {
 
 impl Run<'_> {
     fn all_stages(
-        &mut self,
+        &self,
         workspace: &mut Workspace,
-        limits: &Limits,
+        pool: &ThreadPool,
+        backing: Backing,
     ) -> Result<Outcome, RepairError> {
-        let base = crate::repair::floor_bytes(self.plan.threads);
-        let lease = self
-            .accountant
-            .lease("The program and its threads", base.min(limits.max_memory_bytes))?;
+        let _leases = self.plan.lease(&self.accountant)?;
         let scratch = workspace.scratch().clone();
-        let pool = std::mem::replace(&mut self.pool, start_threads(1)?);
         let resources = Resources {
             scratch: &scratch,
-            pool: &pool,
+            pool,
             share_bytes: self.plan.share_bytes,
             cached_windows: self.plan.cached_windows,
-            backing: limits.backing,
+            backing,
             monitor: &self.recording,
         };
         let (soup, bins, mut findings, settled) = self.ingest(&resources)?;
@@ -139,7 +135,6 @@ impl Run<'_> {
         workspace.checkpoint(Stage::Contour, to_json(&findings))?;
         let proof = self.verify(workspace, &resources)?;
         workspace.checkpoint(Stage::Verify, to_json(&findings))?;
-        drop(lease);
         self.count_scratch(&resources);
         Ok(conclude(self, Results { soup, findings, contour, bytes, proof }))
     }

@@ -16,7 +16,7 @@ mod convert;
 
 use serde::{Deserialize, Serialize};
 
-use crate::monitor::Counter;
+use crate::monitor::{Counter, Gauge, Resident};
 use crate::octree::{BrickKey, Domain, EdgeBits, HitBrick, SIDE, SoupTriangle, encode};
 use crate::scan::collect::Collector;
 use crate::scan::convert::Converter;
@@ -93,11 +93,16 @@ pub fn scan(
 ) -> Result<(BrickFile, ScanStats), StoreError> {
     let mut writer = BrickWriter::create(resources.scratch, HITS, resources.backing)?;
     let mut stats = ScanStats::default();
+    let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
+    let bricks = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered(
         resources.pool,
         || if resources.monitor.cancelled() { Err(StoreError::Cancelled) } else { items() },
         || Workspace::new(domain),
-        |space, item| space.scan_brick(triangles, &item),
+        |space, item| {
+            let _brick = bricks.hold(1);
+            space.scan_brick(triangles, &item, &resident)
+        },
         |scanned| {
             resources.monitor.count(Counter::TrianglesScanned, scanned.stats.triangles);
             resources.monitor.advance(scanned.stats.triangles);
@@ -130,6 +135,7 @@ impl Workspace {
         &mut self,
         triangles: &Spool<SoupTriangle>,
         item: &ScanItem,
+        resident: &Resident,
     ) -> Result<Scanned, StoreError> {
         self.converter.enter(item.brick);
         self.collector.clear();
@@ -137,6 +143,7 @@ impl Workspace {
         let mut drops = item.drops.iter().peekable();
         let mut reader = triangles.reader(item.first, item.count);
         while let Some(block) = reader.next_block()? {
+            let _block = resident.hold(block.len());
             for triangle in block {
                 // Both lists ascend by source number.
                 if drops.next_if(|&&drop| drop == triangle.source).is_some() {

@@ -5,6 +5,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     BrickIndex, BrickKey, FaceRegions, Flips, Neighbour, Regions, edge_position, find_regions,
 };
@@ -105,11 +106,13 @@ pub fn build_graph(
     let mut pieces = Sorter::<FacePiece>::new(resources.scratch, resources.share_bytes / 4);
     let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, "even.spool")?;
     let mut regions = 0_u64;
+    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered(
         resources.pool,
         || Ok(items.next()?),
         Loaded::default,
         |loaded, item| {
+            let _brick = resident.hold(1);
             loaded.load(hits, &item)?;
             Ok(examine(loaded, item.brick))
         },

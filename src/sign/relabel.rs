@@ -1,5 +1,6 @@
 //! Turns regions into signs and marks, and picks the crossing of every marked edge.
 
+use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     ArchivedHitBrick, CornerBits, Crossing, EdgeBits, FlipRecord, Flips, HitEdge, LINES, NO_PLANE,
     PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_hits, edge_position, encode,
@@ -54,6 +55,7 @@ pub fn relabel(
     let mut stats = SignStats::default();
     let mut items = LoadItems::new(hits, flips, Some(decisions.sheets), resources);
     let mut number = 0;
+    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered(
         resources.pool,
         || {
@@ -74,7 +76,10 @@ pub fn relabel(
             Ok(Some(RelabelItem { load, base_parity, verdicts }))
         },
         Workspace::default,
-        |space, item| space.relabel(hits, &item, decisions.rule),
+        |space, item| {
+            let _brick = resident.hold(1);
+            space.relabel(hits, &item, decisions.rule)
+        },
         |done: Relabelled| {
             stats.add(&done.stats);
             resources.monitor.advance(1);

@@ -12,6 +12,7 @@ use crate::contour::mdc::table::{NO_FACE, TWO_SIDED, axis_of_edge, corner_of_edg
 use crate::contour::mdc::{FLIPPED_BIT, components_of};
 use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats};
 use crate::geom::qef::{Hit, QefOptions, solve};
+use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS, SIDE,
     SourcePlane, decode_signs, edge_position, encode,
@@ -40,6 +41,7 @@ pub fn place_vertices(
     let mut writer = BrickWriter::create(resources.scratch, CELLS, resources.backing)?;
     let mut stats = ContourStats::default();
     let mut numbers = 0..signs.len();
+    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered(
         resources.pool,
         || {
@@ -49,7 +51,10 @@ pub fn place_vertices(
             Ok(numbers.next())
         },
         || Workspace::new(domain, options),
-        |space, number| space.place(signs, number),
+        |space, number| {
+            let _brick = resident.hold(1);
+            space.place(signs, number)
+        },
         |placed: Placed| {
             stats.cells += placed.stats.cells;
             stats.multi_cells += placed.stats.multi_cells;
