@@ -26,6 +26,10 @@ pub trait Record: Pod + Send + Sync {
 
 /// Smallest read buffer of a run in a merge.
 const PAGE_BYTES: usize = 4096;
+/// Records of this size and more are sorted by their keys and moved once.
+const WIDE_BYTES: usize = 48;
+/// Wide records are gathered into blocks of this size on their way to the disk.
+const GATHER_BYTES: usize = 64 << 10;
 
 /// Collects records and sorts them.
 pub struct Sorter<R: Record> {
@@ -69,7 +73,17 @@ impl<R: Record> Sorter<R> {
     /// # Errors
     /// A full buffer cannot be written.
     pub fn extend(&mut self, records: &[R]) -> Result<(), StoreError> {
-        records.iter().try_for_each(|record| self.push(*record))
+        let mut left = records;
+        while !left.is_empty() {
+            if self.buffer.len() == self.buffer.capacity() {
+                self.make_room()?;
+            }
+            let room = self.buffer.capacity() - self.buffer.len();
+            let (now, later) = left.split_at(room.min(left.len()));
+            self.buffer.extend_from_slice(now);
+            left = later;
+        }
+        Ok(())
     }
 
     /// Whether nothing was added.
@@ -80,7 +94,8 @@ impl<R: Record> Sorter<R> {
 
     /// Grows the buffer up to its share, and spills it once the share is full.
     fn make_room(&mut self) -> Result<(), StoreError> {
-        let most = self.share_bytes / size_of::<R>();
+        let order_bytes = if is_wide::<R>() { size_of::<(R::Key, u32)>() } else { 0 };
+        let most = (self.share_bytes / (size_of::<R>() + order_bytes)).min(u32::MAX as usize);
         let now = self.buffer.capacity();
         if now < most {
             // Growth by doubling would hold old and new at once: near the end it goes in one step.
@@ -92,10 +107,32 @@ impl<R: Record> Sorter<R> {
     }
 
     fn spill(&mut self) -> Result<(), StoreError> {
-        self.buffer.sort_unstable_by_key(Record::key);
-        self.runs.append(&self.scratch, bytemuck::cast_slice(&self.buffer), self.buffer.len())?;
+        if is_wide::<R>() {
+            self.spill_gathered()?;
+        } else {
+            self.buffer.sort_unstable_by_key(Record::key);
+            let start = self.runs.end;
+            self.runs.write(&self.scratch, bytemuck::cast_slice(&self.buffer))?;
+            self.runs.extents.push((start, self.buffer.len() as u64));
+        }
         self.buffer.clear();
         self.scratch.count_spill();
+        Ok(())
+    }
+
+    /// Writes the records in order, gathered block by block.
+    fn spill_gathered(&mut self) -> Result<(), StoreError> {
+        let start = self.runs.end;
+        let mut block = Vec::with_capacity(GATHER_BYTES / size_of::<R>());
+        for (_, at) in order_of(&self.buffer) {
+            block.push(self.buffer[at as usize]);
+            if block.len() == block.capacity() {
+                self.runs.write(&self.scratch, bytemuck::cast_slice(&block))?;
+                block.clear();
+            }
+        }
+        self.runs.write(&self.scratch, bytemuck::cast_slice(&block))?;
+        self.runs.extents.push((start, self.buffer.len() as u64));
         Ok(())
     }
 
@@ -105,6 +142,10 @@ impl<R: Record> Sorter<R> {
     /// Runs cannot be written or read.
     pub fn finish(mut self) -> Result<Sorted<R>, StoreError> {
         if self.runs.extents.is_empty() {
+            if is_wide::<R>() {
+                let order = order_of(&self.buffer).into_iter();
+                return Ok(Sorted { source: SortedSource::Ordered(self.buffer, order) });
+            }
             self.buffer.sort_unstable_by_key(Record::key);
             return Ok(Sorted { source: SortedSource::Memory(self.buffer.into_iter()) });
         }
@@ -147,14 +188,19 @@ impl<R: Record> Sorter<R> {
     }
 }
 
-impl Runs {
-    fn append(&mut self, scratch: &Scratch, bytes: &[u8], count: usize) -> Result<(), StoreError> {
-        let start = self.end;
-        self.write(scratch, bytes)?;
-        self.extents.push((start, count as u64));
-        Ok(())
-    }
+/// Whether records are moved once, by an order of their keys.
+const fn is_wide<R>() -> bool {
+    size_of::<R>() >= WIDE_BYTES
+}
 
+/// The keys of all records in order, with their places.
+fn order_of<R: Record>(records: &[R]) -> Vec<(R::Key, u32)> {
+    let mut order: Vec<_> = (0..).zip(records).map(|(at, record)| (record.key(), at)).collect();
+    order.sort_unstable_by_key(|entry| entry.0);
+    order
+}
+
+impl Runs {
     fn write(&mut self, scratch: &Scratch, bytes: &[u8]) -> Result<(), StoreError> {
         if self.file.is_none() {
             self.file = Some(scratch.anonymous("sort")?);
@@ -173,6 +219,7 @@ pub struct Sorted<R: Record> {
 
 enum SortedSource<R: Record> {
     Memory(std::vec::IntoIter<R>),
+    Ordered(Vec<R>, std::vec::IntoIter<(R::Key, u32)>),
     Merge(Box<Merge<R>>),
 }
 
@@ -186,6 +233,9 @@ impl<R: Record> Sorted<R> {
     pub fn next(&mut self) -> Result<Option<R>, StoreError> {
         match &mut self.source {
             SortedSource::Memory(records) => Ok(records.next()),
+            SortedSource::Ordered(records, order) => {
+                Ok(order.next().map(|(_, at)| records[at as usize]))
+            }
             SortedSource::Merge(merge) => merge.next(),
         }
     }
@@ -264,6 +314,41 @@ mod tests {
         type Key = Self;
         fn key(&self) -> Self {
             *self
+        }
+    }
+
+    /// A record that is sorted by its key and moved once.
+    #[derive(Clone, Copy, bytemuck::Pod, bytemuck::Zeroable)]
+    #[repr(C)]
+    struct Wide([u64; 8]);
+
+    impl Record for Wide {
+        type Key = u64;
+        fn key(&self) -> u64 {
+            self.0[3]
+        }
+    }
+
+    #[test]
+    fn wide_records_keep_together_in_memory_and_spilled() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        for share_bytes in [16 << 10, 1 << 30] {
+            let mut sorter = Sorter::new(&scratch, share_bytes);
+            for i in 0..5000_u64 {
+                let key = i.wrapping_mul(0x9E37_79B9_7F4A_7C15);
+                sorter.push(Wide(std::array::from_fn(|k| key ^ (k as u64 ^ 3)))).expect("push");
+            }
+            let mut stream = sorter.finish().expect("finish");
+            let mut last = 0;
+            let mut count = 0;
+            while let Some(Wide(words)) = stream.next().expect("next") {
+                assert!(words[3] >= last);
+                assert!((0..8).all(|k| words[k] == words[3] ^ (k as u64 ^ 3)));
+                last = words[3];
+                count += 1;
+            }
+            assert_eq!(count, 5000);
         }
     }
 
