@@ -1,12 +1,14 @@
 //! From signs and Hermite data to a surface: vertices in cells, polygons around crossed edges.
 //!
 //! In:         the brick file of sign generation.
-//! Out:        vertices and triangles into a [`MeshSink`], numbered in Morton order of the bricks.
+//! Out:        vertices and triangles into a [`crate::mesh::MeshSink`], numbered in Morton order of
+//!             the bricks.
 //! Invariant:  closed and 2-manifold by construction; every vertex strictly inside its cell, on
 //!             the lattice that the output file holds exactly; no triangle is degenerate.
 //! Units:      lattice units within a brick, model units at the sink.
 //! Memory:     per worker one brick and the border of its seven lower neighbours; 4 bytes a brick.
 //! Fails:      [`ContourError`]: the scratch disk, the sink, or bricks that contradict each other.
+//! Source:     that of the method; see [`mdc`].
 //!
 //! [`mdc`] is manifold dual contouring, the method that the guarantees rest on. Other methods get
 //! a folder beside it and an arm in [`place_vertices`] and [`write_surface`].

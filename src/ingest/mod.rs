@@ -1,12 +1,12 @@
 //! Takes a file in: triangles on the lattice, in the bins of the bricks that they touch.
 //!
-//! In:         a [`MeshSource`].
+//! In:         a [`crate::mesh::MeshSource`].
 //! Out:        [`Soup`] (a spool of finite triangles, box, names, counts), then [`Bins`] (the same
 //!             triangles once per brick that they touch, by brick and source number), then
 //!             [`Settled`] (which copies of duplicates count, and how much of the soup is open).
 //! Invariant:  a triangle lies in the bin of every brick whose closed box it meets.
 //! Units:      model units in the spool, lattice units for all decisions.
-//! Memory:     the share of [`Resources`]; nothing grows with the input.
+//! Memory:     the share of [`crate::store::Resources`]; nothing grows with the input.
 //! Fails:      [`IngestError`]; triangles with NaN or infinite corners are dropped and counted.
 //! Source:     Ju 2004, Robust repair of polygonal models, section 3 (embedding), on a lattice.
 

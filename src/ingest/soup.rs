@@ -49,7 +49,7 @@ pub struct Soup {
     pub parts: Vec<Part>,
     /// Materials.
     pub materials: Vec<Material>,
-    /// Whether [`ATTRIBUTES`] was written.
+    /// Whether `attributes.spool` was written.
     pub has_attributes: bool,
     /// Counts.
     pub stats: SoupStats,

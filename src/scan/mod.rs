@@ -1,6 +1,6 @@
 //! Scan conversion: bins become bricks of crossings.
 //!
-//! In:         [`Bins`] and the drops of settled duplicates.
+//! In:         `Bins` of ingest and the drops of settled duplicates.
 //! Out:        a brick file of [`HitBrick`]s, one per brick with at least one hit; flag
 //!             [`HAS_ODD_FACES`] where the surface is open.
 //! Invariant:  every hit is decided exactly on the snapped corners, under one symbolic translation

@@ -1,7 +1,7 @@
 //! Decides what is inside: a sign at every corner, and one crossing on every marked edge.
 //!
 //! In:         the brick file of scan, and the flips of patch.
-//! Out:        a brick file of [`SignBrick`]s, one per brick with a marked edge.
+//! Out:        a brick file of [`crate::octree::SignBrick`]s, one per brick with a marked edge.
 //! Invariant:  signs are a function of the grid's corners, marks are their differences, so the
 //!             result is closed whatever the hits were; the border of the grid is outside.
 //! Units:      cells; corners are counted as cells.

@@ -1,6 +1,6 @@
 //! Places one vertex per component in every leaf cell.
 //!
-//! In:         [`SignBrick`]s.
+//! In:         [`crate::octree::SignBrick`]s.
 //! Out:        [`CellBrick`]s: cells with their masks, vertices on the lattice, edge offsets.
 //! Invariant:  a vertex lies strictly inside its cell, and no two share a position.
 
