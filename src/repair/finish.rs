@@ -104,9 +104,13 @@ fn reasons(
     if area_ratio < 1.0 - LOST_AREA_SHARE {
         let lost = (1.0 - area_ratio) * 100.0;
         reasons.push(format!(
-            "{lost:.0} % of the input's area is not in the output: of the grid edges that \
-             triangles cross, {} belong to walls thinner than a cell, {} are inside of the solid",
-            dropped.thin_edges, dropped.buried_edges
+            "{lost:.0} % of the input's area is not in the output: {} triangles are copies of \
+             others; of {} grid edges that triangles cross, {} belong to walls thinner than a \
+             cell, {} are inside of the solid",
+            findings.settle.duplicate_triangles + findings.settle.interface_triangles,
+            findings.scan.hit_edges,
+            dropped.thin_edges,
+            dropped.buried_edges
         ));
     } else if dropped.share_of_surface > LOST_AREA_SHARE {
         let share = dropped.share_of_surface * 100.0;

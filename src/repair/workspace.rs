@@ -11,7 +11,7 @@ use std::path::{Path, PathBuf};
 
 use crate::monitor::Stage;
 use crate::repair::RepairError;
-use crate::store::{Manifest, Scratch, StoreError, save_manifest, sync_folder};
+use crate::store::{Manifest, ManifestFile, Scratch, StoreError, save_manifest, sync_folder};
 
 /// Ending of work folders.
 const ENDING: &str = "brickmend";
@@ -38,6 +38,7 @@ impl Workspace {
         key: [u8; 32],
     ) -> Result<Self, RepairError> {
         let parent = parent_of(output);
+        std::fs::metadata(parent).map_err(|e| StoreError::io("find the folder", parent, e))?;
         let mut name = output.file_name().map_or_else(|| OsString::from("out"), OsString::from);
         name.push(".");
         name.push(ENDING);
@@ -90,8 +91,25 @@ impl Workspace {
     /// The folder cannot be written.
     pub fn checkpoint(&mut self, stage: Stage, findings: String) -> Result<(), StoreError> {
         self.manifest.stages.push(stage.name().to_owned());
+        self.manifest.files = self.list_files()?;
         self.manifest.findings = findings;
         save_manifest(&self.folder.join("manifest"), &self.manifest)
+    }
+
+    /// What lies in the folder besides lock and manifest, by name.
+    fn list_files(&self) -> Result<Vec<ManifestFile>, StoreError> {
+        let failed = |e| StoreError::io("list", &self.folder, e);
+        let mut files = Vec::new();
+        for entry in std::fs::read_dir(&self.folder).map_err(failed)? {
+            let entry = entry.map_err(failed)?;
+            let name = entry.file_name().to_string_lossy().into_owned();
+            if name != "lock" && !name.starts_with("manifest") {
+                let len_bytes = entry.metadata().map_err(failed)?.len();
+                files.push(ManifestFile { name, len_bytes });
+            }
+        }
+        files.sort_by(|a, b| a.name.cmp(&b.name));
+        Ok(files)
     }
 
     /// Puts the finished output in its place, and removes the folder.
