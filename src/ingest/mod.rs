@@ -14,6 +14,8 @@ mod area;
 mod bins;
 mod duplicates;
 mod error;
+mod examine;
+mod packed;
 mod soup;
 mod touch;
 

@@ -174,9 +174,7 @@ impl Domain {
     #[inline]
     pub fn snap(&self, point: [f64; 3]) -> [i32; 3] {
         let to_units = power_of_two(-self.unit_exponent);
-        std::array::from_fn(|a| {
-            ((point[a] * to_units).round() as i64 - self.origin_units[a]) as i32
-        })
+        std::array::from_fn(|a| (nearest(point[a] * to_units) - self.origin_units[a]) as i32)
     }
 
     /// A point in lattice units without rounding to the lattice (up to the last bit of f64).
@@ -194,6 +192,14 @@ impl Domain {
         let unit = power_of_two(self.unit_exponent);
         std::array::from_fn(|a| (self.origin_units[a] + point[a]) as f64 * unit)
     }
+}
+
+/// The nearest integer, halves away from zero; below 2^53, where the difference is exact.
+#[inline]
+fn nearest(x: f64) -> i64 {
+    let whole = x as i64;
+    let rest = x - whole as f64;
+    whole + i64::from(rest >= 0.5) - i64::from(rest <= -0.5)
 }
 
 /// Cells that the model's longest side takes.
@@ -250,6 +256,13 @@ mod tests {
         check(SnapBox { lo: [-1e308; 3], hi: [1e308; 3] }, 8);
         check(SnapBox { lo: [5.0; 3], hi: [5.0; 3] }, 8);
         check(SnapBox { lo: [0.0; 3], hi: [1e-310; 3] }, 8);
+    }
+
+    #[test]
+    fn the_nearest_integer_is_that_of_the_library() {
+        for x in [0.0, 0.5, -0.5, 1.5, 0.499_999_999_999_999_94, -2.5, 1e15 + 0.5, -1e9 - 0.25] {
+            assert_eq!(nearest(x), x.round() as i64, "{x}");
+        }
     }
 
     #[test]
