@@ -9,7 +9,7 @@ use crate::defect::DefectKind;
 use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
 use crate::monitor::Void;
 use crate::store::Scratch;
-use crate::verify::{Failure, Outward, Proof, ProofOptions, prove};
+use crate::verify::{Failure, Outward, Proof, ProofOptions, ProvedSource, prove};
 
 #[derive(Clone, Default)]
 struct Solid {
@@ -119,9 +119,9 @@ impl MeshSource for Memory<'_> {
 fn proof(solid: &Solid, indexed: bool, outward: Outward, share_bytes: u64) -> (Proof, u64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
-    let mut source = Memory { solid, indexed, next: 0 };
+    let mut open = || Ok(Box::new(Memory { solid, indexed, next: 0 }) as ProvedSource<'_, _>);
     let options = ProofOptions { share_bytes, outward };
-    let proof = prove(&mut source, &scratch, &options, &Void).expect("nothing fails in memory");
+    let proof = prove(&mut open, &scratch, &options, &Void).expect("nothing fails in memory");
     (proof, scratch.written_bytes())
 }
 
@@ -319,9 +319,10 @@ fn a_request_to_stop_is_heard() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let solid = unit_cube();
-    let mut source = Memory { solid: &solid, indexed: true, next: 0 };
+    let source = || Box::new(Memory { solid: &solid, indexed: true, next: 0 });
+    let mut open = || Ok(source() as ProvedSource<'_, _>);
     let options = ProofOptions { share_bytes: 1 << 20, outward: Outward::NotAsked };
-    let answer = prove(&mut source, &Scratch::new(folder.path()), &options, &Impatient);
+    let answer = prove(&mut open, &Scratch::new(folder.path()), &options, &Impatient);
     assert!(matches!(
         answer,
         Err(crate::verify::VerifyError::Store(crate::store::StoreError::Cancelled))
