@@ -6,7 +6,7 @@ use std::hint::black_box;
 use brickmend::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
 use brickmend::monitor::Void;
 use brickmend::store::Scratch;
-use brickmend::verify::{Outward, ProofOptions, prove};
+use brickmend::verify::{Outward, ProofOptions, ProvedSource, prove};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 const RINGS: u32 = 500;
@@ -14,7 +14,6 @@ const SIDES: u32 = 501;
 
 struct Sphere {
     batches: Vec<TriangleBatch>,
-    next: usize,
     vertices: Option<u64>,
 }
 
@@ -49,15 +48,21 @@ impl Sphere {
             batches.push(batch);
         }
         let vertices = indexed.then_some(u64::from(2 + (RINGS - 1) * SIDES));
-        Self { batches, next: 0, vertices }
+        Self { batches, vertices }
     }
 }
 
-impl MeshSource for Sphere {
+/// Shows a sphere from its first triangle.
+struct Show<'s> {
+    sphere: &'s Sphere,
+    next: usize,
+}
+
+impl MeshSource for Show<'_> {
     type Error = Infallible;
 
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, Infallible> {
-        let Some(next) = self.batches.get(self.next) else { return Ok(false) };
+        let Some(next) = self.sphere.batches.get(self.next) else { return Ok(false) };
         self.next += 1;
         batch.clone_from(next);
         Ok(true)
@@ -75,7 +80,7 @@ impl MeshSource for Sphere {
         0
     }
     fn vertex_count(&self) -> Option<u64> {
-        self.vertices
+        self.sphere.vertices
     }
 }
 
@@ -90,14 +95,15 @@ fn proofs(criterion: &mut Criterion) {
         ("positions in memory", false, 1 << 30),
         ("positions in 8 MiB", false, 8 << 20),
     ] {
-        let mut sphere = Sphere::new(indexed);
+        let sphere = Sphere::new(indexed);
         let triangles = sphere.batches.iter().map(TriangleBatch::len).sum::<usize>();
         group.throughput(Throughput::Elements(triangles as u64));
         let options = ProofOptions { share_bytes, outward: Outward::AllPositive };
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
-                sphere.next = 0;
-                let proof = prove(&mut sphere, &scratch, &options, &Void);
+                let show = || Box::new(Show { sphere: &sphere, next: 0 });
+                let mut open = || Ok(show() as ProvedSource<'_, Infallible>);
+                let proof = prove(&mut open, &scratch, &options, &Void);
                 let proof = proof.expect("the scratch folder is writable");
                 assert!(proof.holds());
                 black_box(proof)

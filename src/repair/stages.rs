@@ -298,14 +298,13 @@ impl Run<'_> {
 
     fn verify(&self, workspace: &Workspace, resources: &Resources) -> Result<Proof, RepairError> {
         let options = ReadOptions { share_bytes: resources.share_bytes / 4 };
-        let mut source = crate::io::open(workspace.part(), resources.scratch, &options)
-            .map_err(RepairError::ReadBack)?;
+        let mut open = || crate::io::open(workspace.part(), resources.scratch, &options);
         let outward = match self.settings.fill_rule {
             FillRule::Solid => Outward::AllPositive,
             FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
-        let options = ProofOptions { share_bytes: resources.share_bytes / 2, outward };
-        let proof = prove(&mut *source, resources.scratch, &options, &self.recording)
+        let proof_options = ProofOptions { share_bytes: resources.share_bytes / 2, outward };
+        let proof = prove(&mut open, resources.scratch, &proof_options, &self.recording)
             .map_err(RepairError::from_verify)?;
         if proof.holds() {
             return Ok(proof);

@@ -1,7 +1,6 @@
 //! A growing array of fixed records: in memory while it fits its share, in cached blocks on disk
 //! beyond. For look-ups by number, such as the vertices of an indexed file.
 
-use std::collections::HashMap;
 use std::fs::File;
 
 use bytemuck::Pod;
@@ -10,7 +9,8 @@ use crate::store::{Scratch, StoreError};
 
 /// An array of records, read and written by index.
 ///
-/// Memory: `share_bytes` (at least two blocks of one page). One user at a time.
+/// Memory: `share_bytes` (at least two blocks of one page), and on disk 4 bytes for each block of
+/// 4 to 64 KiB. One user at a time.
 pub struct Table<R: Pod> {
     scratch: Scratch,
     share_bytes: usize,
@@ -21,9 +21,12 @@ pub struct Table<R: Pod> {
 
 struct Paged<R> {
     file: File,
+    /// A power of two, and its logarithm.
     block_records: usize,
+    block_shift: u32,
     slots: Vec<Slot<R>>,
-    slot_of_block: HashMap<u64, usize>,
+    /// By block; [`NO_SLOT`] for those that are not in memory.
+    slot_of_block: Vec<u32>,
     slot_count: usize,
     hand: usize,
     last: (u64, usize),
@@ -37,6 +40,7 @@ struct Slot<R> {
 }
 
 const NO_BLOCK: u64 = u64::MAX;
+const NO_SLOT: u32 = u32::MAX;
 
 impl<R: Pod> Table<R> {
     /// An empty table that keeps at most `share_bytes` in memory.
@@ -62,6 +66,7 @@ impl<R: Pod> Table<R> {
     ///
     /// # Errors
     /// A block cannot be written or read back.
+    #[inline]
     pub fn push(&mut self, record: R) -> Result<(), StoreError> {
         if self.paged.is_none() {
             let most = self.share_bytes / size_of::<R>();
@@ -121,13 +126,15 @@ impl<R: Pod> Table<R> {
         self.scratch.write_at(&file, bytemuck::cast_slice(&self.resident), 0)?;
         self.resident = Vec::new();
         let block_bytes = (self.share_bytes / 8).clamp(4096, 64 << 10);
-        let block_records = (block_bytes / size_of::<R>()).max(1);
+        let block_shift = (block_bytes / size_of::<R>()).max(1).ilog2();
+        let block_records = 1 << block_shift;
         let slot_count = (self.share_bytes / (block_records * size_of::<R>())).max(2);
         self.paged = Some(Paged {
             file,
             block_records,
+            block_shift,
             slots: Vec::new(),
-            slot_of_block: HashMap::new(),
+            slot_of_block: Vec::new(),
             slot_count,
             hand: 0,
             last: (NO_BLOCK, 0),
@@ -138,15 +145,16 @@ impl<R: Pod> Table<R> {
 
 impl<R: Pod> Paged<R> {
     /// Slot and place in it of a record, after loading its block.
+    #[inline]
     fn find(&mut self, scratch: &Scratch, index: u64) -> Result<(usize, usize), StoreError> {
-        let block = index / self.block_records as u64;
-        let at = (index % self.block_records as u64) as usize;
+        let block = index >> self.block_shift;
+        let at = index as usize & (self.block_records - 1);
         if self.last.0 == block {
             return Ok((self.last.1, at));
         }
-        let slot = match self.slot_of_block.get(&block) {
-            Some(&slot) => slot,
-            None => self.load(scratch, block)?,
+        let slot = match self.slot_of_block.get(block as usize) {
+            Some(&slot) if slot != NO_SLOT => slot as usize,
+            _ => self.load(scratch, block)?,
         };
         self.slots[slot].used = true;
         self.last = (block, slot);
@@ -154,6 +162,7 @@ impl<R: Pod> Paged<R> {
     }
 
     /// Reads a block into a free or evicted slot (second chance).
+    #[cold]
     fn load(&mut self, scratch: &Scratch, block: u64) -> Result<usize, StoreError> {
         let slot = if self.slots.len() < self.slot_count {
             let records = vec![R::zeroed(); self.block_records];
@@ -173,12 +182,17 @@ impl<R: Pod> Paged<R> {
             let bytes: &[u8] = bytemuck::cast_slice(&victim.records);
             scratch.write_at(&self.file, bytes, victim.block * block_bytes)?;
         }
-        self.slot_of_block.remove(&victim.block);
+        if victim.block != NO_BLOCK {
+            self.slot_of_block[victim.block as usize] = NO_SLOT;
+        }
         victim.records.fill(R::zeroed());
         read_up_to(scratch, &self.file, &mut victim.records, block * block_bytes)?;
         victim.block = block;
         victim.dirty = false;
-        self.slot_of_block.insert(block, slot);
+        if self.slot_of_block.len() <= block as usize {
+            self.slot_of_block.resize(block as usize + 1, NO_SLOT);
+        }
+        self.slot_of_block[block as usize] = slot as u32;
         self.last = (NO_BLOCK, 0);
         Ok(slot)
     }

@@ -1,7 +1,7 @@
 //! Connected components and, for each closed one, which side its volume is on.
 //!
 //! In:         the tape, and the vertices whose edges are not used alike in both directions.
-//! Out:        [`Component`]s with the sign of their volume; area and volume of the whole.
+//! Out:        [`Component`]s with the sign of their volume.
 //! Invariant:  signs are exact: f64 sums about a point of the component decide where their error
 //!             bound allows, exact sums decide the rest. A sign is asked of a component only if
 //!             all its edges are balanced; else its volume means nothing.
@@ -14,7 +14,8 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::Monitor;
 use crate::store::{Labels, Record, Scratch, Sorter, StoreError, Unite};
-use crate::verify::exact::{ExactVolume, two_sum};
+use crate::verify::cone::{CONE_BOUND, Compensated, Cone, LEAST_VOLUME};
+use crate::verify::exact::ExactVolume;
 use crate::verify::spool::Spool;
 use crate::verify::tape::Tape;
 
@@ -37,58 +38,23 @@ pub(crate) struct Component {
     pub(crate) side: i32,
 }
 
-/// Unites the vertices of every whole triangle.
+/// Unites the vertices of every whole triangle, and counts those.
 pub(crate) fn unite(
     tape: &Tape,
     space: u64,
     scratch: &Scratch,
     share_bytes: u64,
     monitor: &dyn Monitor,
-) -> Result<Labels, StoreError> {
+) -> Result<(Labels, u64), StoreError> {
     let mut sets = Unite::new(scratch, share_bytes, space)?;
+    let mut triangles = 0;
     tape.each_whole(monitor, |[a, b, c]| {
+        triangles += 1;
         sets.unite(a, b)?;
         sets.unite(b, c)
     })?;
-    sets.finish()
+    Ok((sets.finish()?, triangles))
 }
-
-/// A sum that carries its rounding error along (Neumaier 1974).
-#[derive(Clone, Copy, Default)]
-pub(crate) struct Compensated {
-    sum: f64,
-    rest: f64,
-}
-
-impl Compensated {
-    pub(crate) fn add(&mut self, term: f64) {
-        let (sum, rest) = two_sum(self.sum, term);
-        self.sum = sum;
-        self.rest += rest;
-    }
-
-    pub(crate) fn value(&self) -> f64 {
-        self.sum + self.rest
-    }
-}
-
-/// Six times the signed volume of the cone from `origin`, and the sum of its products' magnitudes.
-#[inline]
-pub(crate) fn cone(corners: &[[f64; 3]; 3], origin: [f64; 3]) -> (f64, f64) {
-    let [a, b, c] = corners.map(|p| [p[0] - origin[0], p[1] - origin[1], p[2] - origin[2]]);
-    let (mut volume, mut magnitude) = (0.0, 0.0);
-    for (u, v, w) in [(0, 1, 2), (1, 2, 0), (2, 0, 1)] {
-        let (left, right) = (b[v] * c[w], b[w] * c[v]);
-        volume += a[u] * (left - right);
-        magnitude += a[u].abs() * (left.abs() + right.abs());
-    }
-    (volume, magnitude)
-}
-
-/// Error of [`cone`] and of its compensated sum per magnitude: 16 roundings, where 10 can happen.
-const CONE_BOUND: f64 = 16.0 * f64::EPSILON;
-/// Below this, products may have been flushed to zero.
-const LEAST_VOLUME: f64 = 1.0e-270;
 
 /// A component while its triangles pass by.
 #[derive(Clone, Copy)]
@@ -107,9 +73,9 @@ impl Body {
     }
 
     fn add(&mut self, corners: &[[f64; 3]; 3]) {
-        let (volume, magnitude) = cone(corners, self.origin);
-        self.volume.add(volume);
-        self.magnitude += magnitude;
+        let cone = Cone::of(corners, self.origin);
+        self.volume.add(cone.volume);
+        self.magnitude += cone.magnitude;
         for corner in corners {
             if *corner < self.component.anchor {
                 self.component.anchor = corner.map(|x| x + 0.0);

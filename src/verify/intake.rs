@@ -1,4 +1,4 @@
-//! The one pass over the file: counts, box, degenerate triangles, and the tape.
+//! What a look at each triangle tells: counts, box, area, volume, degenerates; and the tape.
 //!
 //! In:         a [`MeshSource`], read to its end.
 //! Out:        the tape with corners, and with vertex numbers in formats that have them.
@@ -8,12 +8,12 @@
 use robust::{Coord, orient2d};
 
 use crate::defect::{Defect, DegenerateTriangle, NonfiniteTriangle};
-use crate::mesh::{MeshSource, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
-use crate::store::StoreError;
-use crate::verify::VerifyError;
+use crate::verify::cone::{Compensated, Cone};
 use crate::verify::places::MOST_PLACES;
-use crate::verify::tape::{Tape, is_whole};
+use crate::verify::tape::{Tape, is_whole, stop_if_asked};
+use crate::verify::{Proof, VerifyError};
 
 /// What the pass found.
 #[derive(Default)]
@@ -25,6 +25,10 @@ pub(crate) struct Intake {
     pub(crate) bounds: Option<[[f64; 3]; 2]>,
     /// One more than the largest vertex number, or what the file lists; `None` without numbers.
     pub(crate) vertices: Option<u64>,
+    /// Where cones are seen from: the first finite corner.
+    origin: [f64; 3],
+    area: Compensated,
+    volume: Compensated,
     pub(crate) nonfinite_places: Vec<Defect>,
     pub(crate) degenerate_places: Vec<Defect>,
 }
@@ -43,40 +47,28 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
 ) -> Result<Intake, VerifyError<S::Error>> {
     let mut intake = Intake::default();
     let mut batch = TriangleBatch::default();
-    let mut indexed = false;
     while source.next_batch(&mut batch).map_err(|source| VerifyError::Source { source })? {
-        if monitor.cancelled() {
-            return Err(StoreError::Cancelled.into());
-        }
-        indexed |= !batch.indices.is_empty();
+        stop_if_asked(monitor)?;
         for (at, corners) in batch.corners.iter().enumerate() {
             let ids = batch.indices.get(at).copied();
-            intake.add(corners, ids, tape)?;
+            let is_finite = intake.add(corners, ids).is_some();
+            tape.push_corners(*corners)?;
+            if let Some(ids) = ids {
+                tape.push_ids(if is_finite { ids } else { [0; 3] })?;
+            }
         }
         monitor.advance(batch.len() as u64);
     }
-    let listed = source.vertex_count();
-    intake.vertices = match (indexed, listed) {
-        (true, _) => Some(intake.vertices.unwrap_or(0).max(listed.unwrap_or(0))),
-        (false, Some(listed)) if intake.triangles == 0 => Some(listed),
-        (false, _) => None,
-    };
-    let discarded = source.discarded();
-    intake.discarded_faces = discarded.wild_index_faces + discarded.short_faces;
+    intake.close(source.vertex_count(), source.discarded());
     Ok(intake)
 }
 
 impl Intake {
+    /// Counts a triangle; `None` if it has a corner at infinity.
     #[inline]
-    fn add(
-        &mut self,
-        corners: &[[f64; 3]; 3],
-        ids: Option<[u32; 3]>,
-        tape: &mut Tape,
-    ) -> Result<(), StoreError> {
+    pub(crate) fn add(&mut self, corners: &[[f64; 3]; 3], ids: Option<[u32; 3]>) -> Option<Cone> {
         let triangle = self.triangles;
         self.triangles += 1;
-        tape.push_corners(*corners)?;
         if let Some(ids) = ids {
             let most = u64::from(ids[0].max(ids[1]).max(ids[2])) + 1;
             self.vertices = Some(self.vertices.map_or(most, |so_far| so_far.max(most)));
@@ -87,46 +79,61 @@ impl Intake {
                 let defect = Defect::NonfiniteTriangle(NonfiniteTriangle { triangle });
                 self.nonfinite_places.push(defect);
             }
-            return if ids.is_some() { tape.push_ids([0; 3]) } else { Ok(()) };
+            return None;
         }
-        self.widen(corners);
-        if ids.is_some_and(|ids| !is_whole(ids)) || is_degenerate(corners) {
+        let [low, high] = self.bounds.get_or_insert_with(|| {
+            self.origin = corners[0];
+            [corners[0]; 2]
+        });
+        widen(low, high, corners);
+        let cone = Cone::of(corners, self.origin);
+        self.area.add(cone.square.sqrt());
+        self.volume.add(cone.volume);
+        if ids.is_some_and(|ids| !is_whole(ids)) || (!cone.has_area && is_flat(corners)) {
             self.degenerate += 1;
             if self.degenerate_places.len() < MOST_PLACES {
                 let defect = DegenerateTriangle { triangle, corners: *corners };
                 self.degenerate_places.push(Defect::DegenerateTriangle(defect));
             }
         }
-        ids.map_or(Ok(()), |ids| tape.push_ids(ids))
+        Some(cone)
     }
 
-    #[inline]
-    fn widen(&mut self, corners: &[[f64; 3]; 3]) {
-        let [low, high] = self.bounds.get_or_insert([corners[0]; 2]);
-        for corner in corners {
-            for axis in 0..3 {
-                // Adding zero turns -0 into 0, so that the box does not depend on the order.
-                low[axis] = low[axis].min(corner[axis]) + 0.0;
-                high[axis] = high[axis].max(corner[axis]) + 0.0;
-            }
+    /// Ends the file, which lists so many vertices.
+    pub(crate) fn close(&mut self, listed: Option<u64>, discarded: Discarded) {
+        self.vertices = match (self.vertices, listed) {
+            (Some(named), listed) => Some(named.max(listed.unwrap_or(0))),
+            (None, listed) => listed.filter(|_| self.triangles == 0),
+        };
+        self.discarded_faces = discarded.wild_index_faces + discarded.short_faces;
+    }
+
+    /// Enters what needs no topology.
+    pub(crate) fn enter_into(&self, proof: &mut Proof) {
+        proof.triangles = self.triangles;
+        proof.nonfinite_triangles = self.nonfinite;
+        proof.degenerate_triangles = self.degenerate;
+        proof.discarded_faces = self.discarded_faces;
+        proof.bounds = self.bounds;
+        proof.area = self.area.value() / 2.0;
+        proof.volume = self.volume.value() / 6.0;
+    }
+}
+
+#[inline]
+fn widen(low: &mut [f64; 3], high: &mut [f64; 3], corners: &[[f64; 3]; 3]) {
+    for corner in corners {
+        for axis in 0..3 {
+            // Adding zero turns -0 into 0, so that the box does not depend on the order.
+            low[axis] = low[axis].min(corner[axis]) + 0.0;
+            high[axis] = high[axis].max(corner[axis]) + 0.0;
         }
     }
 }
 
-/// Relative error bound of a 2 x 2 determinant of differences.
-const ORIENT_BOUND: f64 = 3.4e-16;
-
 /// Whether the corners lie on one line, exactly.
-#[inline]
-fn is_degenerate(&[a, b, c]: &[[f64; 3]; 3]) -> bool {
-    let certain = |u: usize, v: usize| {
-        let left = (b[u] - a[u]) * (c[v] - a[v]);
-        let right = (b[v] - a[v]) * (c[u] - a[u]);
-        (left - right).abs() > ORIENT_BOUND * (left.abs() + right.abs())
-    };
-    if certain(0, 1) || certain(1, 2) || certain(2, 0) {
-        return false;
-    }
+#[cold]
+fn is_flat(&[a, b, c]: &[[f64; 3]; 3]) -> bool {
     let flat = |u: usize, v: usize| {
         let at = |p: [f64; 3]| Coord { x: p[u], y: p[v] };
         orient2d(at(a), at(b), at(c)) == 0.0

@@ -11,7 +11,7 @@ use crate::verify::spool::Spool;
 pub(crate) type Wedge = [u32; 2];
 
 /// Above this number of wedges, sorting is faster than comparing all pairs.
-const FEW_WEDGES: usize = 24;
+pub(crate) const FEW_WEDGES: usize = 24;
 
 /// Edge counts and vertex counts.
 pub(crate) struct Judgement {
@@ -126,7 +126,7 @@ impl Judgement {
 
 /// Whether the wedges close one round with every neighbour once.
 #[inline]
-fn is_one_cycle(wedges: &mut [Wedge]) -> bool {
+pub(crate) fn is_one_cycle(wedges: &mut [Wedge]) -> bool {
     let count = wedges.len();
     for at in 0..count - 1 {
         let wanted = wedges[at][1];
@@ -138,6 +138,24 @@ fn is_one_cycle(wedges: &mut [Wedge]) -> bool {
     // With all next vertices different, a closed chain of all wedges cannot be two.
     let distinct = (1..count).all(|at| wedges[..at].iter().all(|w| w[0] != wedges[at][0]));
     distinct && wedges[count - 1][1] == wedges[0][0]
+}
+
+/// The same for many wedges.
+pub(crate) fn is_one_long_cycle(wedges: &mut [Wedge]) -> bool {
+    wedges.sort_unstable();
+    if wedges.windows(2).any(|pair| pair[0][0] == pair[1][0]) {
+        return false;
+    }
+    let first = wedges[0][0];
+    let mut at = wedges[0];
+    for _ in 1..wedges.len() {
+        let Ok(next) = wedges.binary_search_by_key(&at[1], |wedge| wedge[0]) else { return false };
+        at = wedges[next];
+        if at[0] == first {
+            return false;
+        }
+    }
+    at[1] == first
 }
 
 /// Counts the fans of wedges that hang together over neighbours (ascending).

@@ -1,20 +1,23 @@
 //! The proof: whether a file is closed, 2-manifold, oriented outward and free of degenerates.
 //!
-//! In:         a [`MeshSource`], read once.
+//! In:         a [`MeshSource`]: read once if all is well, else once more to tell what is not.
 //! Out:        a [`Proof`]: exact counts, a few places of each defect, volume and area.
 //! Invariant:  shares no code with the stages that build surfaces. Counts and places depend on the
 //!             file alone, not on the share. A vertex is the file's own where it has numbers, a
 //!             position otherwise, compared exactly.
 //! Units:      model units.
-//! Memory:     about `share_bytes` whatever the file, at least some tens of KiB; beyond it the
-//!             work lies in scratch files (84 bytes a triangle, and 36 more for the fans).
+//! Memory:     about `share_bytes` whatever the file, at least some tens of KiB. A sound surface
+//!             leaves 8 bytes a vertex in scratch files; one that is not, or whose triangles lie
+//!             too scattered in the file, 84 bytes a triangle, and 36 more for the fans.
 //! Fails:      [`VerifyError`]: the source, the scratch disk, or a request to stop. Whatever is
 //!             wrong with the mesh is in the proof.
 //! Source:     the one-cycle test of vertex links; Tarjan 1975 for components; Shewchuk 1997 for
 //!             exact signs.
 
+mod bodies;
 mod coincidence;
 mod components;
+mod cone;
 mod crowd;
 mod exact;
 mod fans;
@@ -26,17 +29,23 @@ mod places;
 mod positions;
 mod proof;
 mod prover;
+mod slots;
 mod spool;
+mod stream;
 mod tape;
 #[cfg(test)]
 mod tests;
+mod window;
 
 pub use proof::{Failure, Proof};
+
+use std::error::Error;
 
 use crate::mesh::MeshSource;
 use crate::monitor::{Monitor, Stage};
 use crate::store::{Scratch, StoreError};
 use crate::verify::prover::Prover;
+use crate::verify::stream::prove_sound;
 
 /// What orientation is asked of closed components.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -73,20 +82,29 @@ pub enum VerifyError<E> {
     Store(#[from] StoreError),
 }
 
-/// Reads a whole mesh and judges it.
+/// A mesh that is read for its proof.
+pub type ProvedSource<'s, E> = Box<dyn MeshSource<Error = E> + Send + 's>;
+
+/// Reads a whole mesh and judges it; `open` starts it from its first triangle, at most twice.
 ///
 /// # Errors
 /// The source cannot be read, the scratch disk fails, or the monitor asks to stop.
-pub fn prove<S: MeshSource + ?Sized>(
-    source: &mut S,
+pub fn prove<'s, E: Error + Send>(
+    open: &mut dyn FnMut() -> Result<ProvedSource<'s, E>, E>,
     scratch: &Scratch,
     options: &ProofOptions,
     monitor: &dyn Monitor,
-) -> Result<Proof, VerifyError<S::Error>> {
+) -> Result<Proof, VerifyError<E>> {
     monitor.begin(Stage::Verify, 0);
-    let mut prover = Prover::new(scratch, options, monitor);
-    prover.read(source)?;
-    let proof = prover.judge()?;
+    let mut start = || open().map_err(|source| VerifyError::Source { source });
+    let proof = match prove_sound(&mut *start()?, scratch, options, monitor)? {
+        Some(proof) => proof,
+        None => {
+            let mut prover = Prover::new(scratch, options, monitor);
+            prover.read(&mut *start()?)?;
+            prover.judge()?
+        }
+    };
     monitor.end(Stage::Verify);
     Ok(proof)
 }

@@ -72,7 +72,7 @@ impl PositionIndex {
 
 /// Mixes all bits of a key by folded multiplication.
 #[inline]
-fn hash([x, y, z]: PositionKey) -> u64 {
+pub(crate) fn hash([x, y, z]: PositionKey) -> u64 {
     let fold = |a: u64, b: u64| {
         let product = u128::from(a) * u128::from(b);
         product as u64 ^ (product >> 64) as u64

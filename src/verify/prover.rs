@@ -8,9 +8,7 @@ use crate::mesh::MeshSource;
 use crate::monitor::Monitor;
 use crate::store::{Labels, Scratch, StoreError};
 use crate::verify::coincidence::find_coincident;
-use crate::verify::components::{
-    Compensated, Component, Measure, OPEN, UNDECIDED, cone, each_block, unite,
-};
+use crate::verify::components::{Component, Measure, OPEN, UNDECIDED, each_block, unite};
 use crate::verify::fans::judge_fans;
 use crate::verify::intake::{Intake, read};
 use crate::verify::link::Judgement;
@@ -80,8 +78,8 @@ impl<'p> Prover<'p> {
         if indexed {
             self.enter_coincidence(space)?;
         }
-        self.measure()?;
-        let mut labels = unite(&self.tape, space, scratch, self.quarter_bytes, monitor)?;
+        let (mut labels, whole) = unite(&self.tape, space, scratch, self.quarter_bytes, monitor)?;
+        self.proof.euler_characteristic += whole as i64;
         self.count_components(&mut labels, space - judgement.used_vertices)?;
         if self.outward != Outward::NotAsked {
             self.enter_orientation(&mut labels, &judgement.unbalanced)?;
@@ -90,20 +88,16 @@ impl<'p> Prover<'p> {
     }
 
     fn enter_counts(&mut self, vertices: u64, judgement: &Judgement) {
-        let (intake, proof) = (&self.intake, &mut self.proof);
+        let proof = &mut self.proof;
+        self.intake.enter_into(proof);
         proof.vertices = vertices;
-        proof.triangles = intake.triangles;
-        proof.nonfinite_triangles = intake.nonfinite;
-        proof.degenerate_triangles = intake.degenerate;
-        proof.discarded_faces = intake.discarded_faces;
-        proof.bounds = intake.bounds;
         proof.edges = judgement.edges;
         proof.boundary_edges = judgement.boundary_edges;
         proof.nonmanifold_edges = judgement.nonmanifold_edges;
         proof.inconsistent_edges = judgement.inconsistent_edges;
         proof.nonmanifold_vertices = judgement.nonmanifold_vertices;
         proof.unused_vertices = vertices - judgement.used_vertices;
-        // The triangles of the topology are added when they are measured.
+        // The triangles of the topology are added when they are counted.
         proof.euler_characteristic = judgement.used_vertices as i64 - judgement.edges as i64;
     }
 
@@ -147,26 +141,6 @@ impl<'p> Prover<'p> {
             let pair = CoincidentVertices { vertices: [first, vertex], position: position_of(key) };
             self.proof.places.push(Defect::CoincidentVertices(pair));
         }
-        Ok(())
-    }
-
-    /// Area and volume of the whole, in file order and about the middle of the box.
-    fn measure(&mut self) -> Result<(), StoreError> {
-        let [low, high] = self.proof.bounds.unwrap_or_default();
-        let middle = std::array::from_fn(|axis| low[axis].midpoint(high[axis]));
-        let (mut area, mut volume) = (Compensated::default(), Compensated::default());
-        let mut triangles = 0;
-        self.tape.each(self.monitor, |triangle| {
-            if triangle.is_whole() {
-                triangles += 1;
-                area.add(area_of(triangle.corners));
-                volume.add(cone(triangle.corners, middle).0);
-            }
-            Ok(true)
-        })?;
-        self.proof.euler_characteristic += triangles;
-        self.proof.area = area.value();
-        self.proof.volume = volume.value() / 6.0;
         Ok(())
     }
 
@@ -240,10 +214,4 @@ fn verdict(component: &Component, nesting: Nesting) -> Option<bool> {
         _ if nesting.touches => None,
         side => Some((side < 0) == nesting.odd),
     }
-}
-
-fn area_of(&[a, b, c]: &[[f64; 3]; 3]) -> f64 {
-    let [u, v]: [[f64; 3]; 2] = [b, c].map(|p| [p[0] - a[0], p[1] - a[1], p[2] - a[2]]);
-    let normal: [f64; 3] = [(1, 2), (2, 0), (0, 1)].map(|(i, j)| u[i] * v[j] - u[j] * v[i]);
-    normal.iter().map(|x| x * x).sum::<f64>().sqrt() / 2.0
 }

@@ -9,7 +9,9 @@ use crate::defect::DefectKind;
 use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
 use crate::monitor::Void;
 use crate::store::Scratch;
-use crate::verify::{Failure, Outward, Proof, ProofOptions, prove};
+use crate::verify::prover::Prover;
+use crate::verify::stream::prove_sound;
+use crate::verify::{Failure, Outward, Proof, ProofOptions, ProvedSource, prove};
 
 #[derive(Clone, Default)]
 struct Solid {
@@ -67,6 +69,11 @@ impl Solid {
         self
     }
 
+    fn shifted(mut self, by: f64) -> Self {
+        self.vertices.iter_mut().for_each(|p| p[0] += by);
+        self
+    }
+
     fn flipped(mut self) -> Self {
         self.triangles.iter_mut().for_each(|t| t.swap(0, 1));
         self
@@ -119,9 +126,9 @@ impl MeshSource for Memory<'_> {
 fn proof(solid: &Solid, indexed: bool, outward: Outward, share_bytes: u64) -> (Proof, u64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
-    let mut source = Memory { solid, indexed, next: 0 };
+    let mut open = || Ok(Box::new(Memory { solid, indexed, next: 0 }) as ProvedSource<'_, _>);
     let options = ProofOptions { share_bytes, outward };
-    let proof = prove(&mut source, &scratch, &options, &Void).expect("nothing fails in memory");
+    let proof = prove(&mut open, &scratch, &options, &Void).expect("nothing fails in memory");
     (proof, scratch.written_bytes())
 }
 
@@ -291,14 +298,8 @@ fn many_components_and_a_crowded_vertex_give_the_same_proof_on_disk() {
         let next = if i % 5 == 0 { Solid::cube(at, 1.0).flipped() } else { Solid::cube(at, 1.0) };
         many = many.with(&next);
     }
-    // A bipyramid with 1500 sides, one side of which is open.
-    let mut hub = Solid { vertices: vec![[-9.0, 0.0, 1.0], [-9.0, 0.0, -1.0]], triangles: vec![] };
-    for i in 0..1500_u32 {
-        let angle = f64::from(i) * std::f64::consts::TAU / 1500.0;
-        hub.vertices.push([-9.0 + angle.cos(), angle.sin(), 0.0]);
-        let (a, b) = (2 + i, 2 + (i + 1) % 1500);
-        hub.triangles.extend([[0, a, b], [1, b, a]]);
-    }
+    // One side of which is open.
+    let mut hub = bipyramid(1500);
     hub.triangles.pop();
     let all = many.with(&hub);
     let expected = [(DefectKind::BoundaryEdge, 3), (DefectKind::InwardComponent, 140)];
@@ -307,6 +308,41 @@ fn many_components_and_a_crowded_vertex_give_the_same_proof_on_disk() {
     let (_, written) = proof(&all, true, Outward::AllPositive, 16 << 10);
     assert!(written > 1 << 20, "the small share must spill, wrote {written}");
     assert_eq!(proof(&all, true, Outward::AllPositive, 64 << 20).1, 0);
+}
+
+/// A bipyramid with `sides` sides.
+fn bipyramid(sides: u32) -> Solid {
+    let mut hub = Solid { vertices: vec![[-9.0, 0.0, 1.0], [-9.0, 0.0, -1.0]], triangles: vec![] };
+    for i in 0..sides {
+        let angle = f64::from(i) * std::f64::consts::TAU / f64::from(sides);
+        hub.vertices.push([-9.0 + angle.cos(), angle.sin(), 0.0]);
+        let (a, b) = (2 + i, 2 + (i + 1) % sides);
+        hub.triangles.extend([[0, a, b], [1, b, a]]);
+    }
+    hub
+}
+
+#[test]
+fn a_sound_surface_has_the_same_proof_in_one_pass_and_from_the_tape() {
+    let mut many = Solid::torus(30, 20).with(&bipyramid(1500));
+    many = many.with(&Solid::cube([20.0, 1.0, 7.0], 0.1)).with(&bipyramid(20).shifted(30.0));
+    // Neighbours in the file are neighbours no more.
+    many.triangles.sort_unstable_by_key(|t| t.map(|id| id.wrapping_mul(0x9E37_79B9)));
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scratch = Scratch::new(folder.path());
+    let options = ProofOptions { share_bytes: 8 << 20, outward: Outward::AllPositive };
+    for indexed in [true, false] {
+        let source = || Memory { solid: &many, indexed, next: 0 };
+        let at_once = prove_sound(&mut source(), &scratch, &options, &Void).expect("no failure");
+        let mut prover = Prover::new(&scratch, &options, &Void);
+        prover.read(&mut source()).expect("no failure");
+        let taped = prover.judge().expect("no failure");
+        assert_eq!(taped.components, 4);
+        assert_eq!(at_once, Some(taped));
+    }
+    let tight = ProofOptions { share_bytes: 64 << 10, ..options };
+    let mut source = Memory { solid: &many, indexed: true, next: 0 };
+    assert_eq!(prove_sound(&mut source, &scratch, &tight, &Void).expect("no failure"), None);
 }
 
 #[test]
@@ -319,9 +355,10 @@ fn a_request_to_stop_is_heard() {
     }
     let folder = tempfile::tempdir().expect("a temporary folder");
     let solid = unit_cube();
-    let mut source = Memory { solid: &solid, indexed: true, next: 0 };
+    let source = || Box::new(Memory { solid: &solid, indexed: true, next: 0 });
+    let mut open = || Ok(source() as ProvedSource<'_, _>);
     let options = ProofOptions { share_bytes: 1 << 20, outward: Outward::NotAsked };
-    let answer = prove(&mut source, &Scratch::new(folder.path()), &options, &Impatient);
+    let answer = prove(&mut open, &Scratch::new(folder.path()), &options, &Impatient);
     assert!(matches!(
         answer,
         Err(crate::verify::VerifyError::Store(crate::store::StoreError::Cancelled))

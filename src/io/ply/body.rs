@@ -34,6 +34,22 @@ impl Body {
         }
     }
 
+    /// What is buffered of a binary file, at least `count` bytes of it unless the file ends.
+    pub(crate) fn look_ahead(&mut self, count: usize) -> Result<&[u8], IoError> {
+        match self {
+            Self::Text { .. } => Ok(&[]),
+            Self::Binary { input, .. } => input.look_ahead(count),
+        }
+    }
+
+    /// Passes over what was looked at.
+    #[inline]
+    pub(crate) fn consume(&mut self, count: usize) {
+        if let Self::Binary { input, .. } = self {
+            input.consume(count);
+        }
+    }
+
     pub(crate) fn unreadable(&self, expected: &str, found: &str) -> IoError {
         match self {
             Self::Text { words, .. } => words.unreadable(expected, found),

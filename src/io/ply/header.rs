@@ -44,6 +44,15 @@ impl Scalar {
         })
     }
 
+    /// A colour channel as a byte: whole numbers by their upper bits, fractions of one by scale.
+    pub(crate) fn channel(self, number: f64) -> u8 {
+        match self {
+            Self::F32 | Self::F64 => (number * 255.0).round() as u8,
+            Self::I16 | Self::U16 => (number / 256.0) as u8,
+            _ => number as u8,
+        }
+    }
+
     pub(crate) fn size_bytes(self) -> usize {
         match self {
             Self::I8 | Self::U8 => 1,

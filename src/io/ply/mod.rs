@@ -2,6 +2,7 @@
 
 mod body;
 mod header;
+mod plain;
 mod reader;
 mod strip;
 mod writer;

@@ -11,6 +11,7 @@ use crate::io::error::IoError;
 use crate::io::input::Input;
 use crate::io::ply::body::Body;
 use crate::io::ply::header::{Header, Kind, Role, Scalar};
+use crate::io::ply::plain;
 use crate::io::ply::strip::{Step, Strip};
 use crate::io::polygon::{
     Columns, Corner, Owner, PolygonCutter, WHITE, checked_index, polygon_number,
@@ -82,13 +83,30 @@ impl PlyReader {
         for element in &self.header.elements[..vertices] {
             self.body.skip_element(element)?;
         }
-        for _ in 0..self.header.elements[vertices].count {
+        let mut left = self.header.elements[vertices].count;
+        if plain::has_plain_vertices(&self.body, &self.header.elements[vertices]) {
+            left = plain::read_vertices(&mut self.body, &mut self.positions, left)?;
+        }
+        for _ in 0..left {
             self.read_vertex(vertices)?;
         }
         if self.header.first_surface().is_some_and(|surface| surface < vertices) {
             self.body.rewind()?;
         } else {
             self.element = vertices + 1;
+        }
+        Ok(())
+    }
+
+    /// Reads triangles as far as they are plain and the batch has room for them.
+    fn read_plain_triangles(&mut self, batch: &mut TriangleBatch) -> Result<(), IoError> {
+        let Some(element) = self.header.elements.get(self.element) else { return Ok(()) };
+        if self.colours.is_none() && plain::has_plain_triangles(&self.body, element) {
+            let left = element.count - self.entry;
+            let (body, positions) = (&mut self.body, &mut self.positions);
+            let read = plain::read_triangles(body, positions, left, self.polygons, batch)?;
+            self.entry += read;
+            self.polygons += read;
         }
         Ok(())
     }
@@ -105,7 +123,7 @@ impl PlyReader {
             let number = self.body.number(property.scalar)?;
             match property.role {
                 Role::Coordinate(axis) => position[axis] = number,
-                Role::Colour(channel) => colour[channel] = channel_value(number, property.scalar),
+                Role::Colour(channel) => colour[channel] = property.scalar.channel(number),
                 Role::Indices | Role::Other => {}
             }
         }
@@ -239,7 +257,14 @@ impl MeshSource for PlyReader {
         if !self.vertices_known {
             self.read_vertices()?;
         }
-        while self.polygon.deliver(batch) && batch.len() < BATCH_TRIANGLES && self.read_on()? {}
+        while self.polygon.deliver(batch) && batch.len() < BATCH_TRIANGLES {
+            if self.polygon.len() == 0 && self.property == 0 {
+                self.read_plain_triangles(batch)?;
+            }
+            if batch.len() < BATCH_TRIANGLES && !self.read_on()? {
+                break;
+            }
+        }
         Ok(!batch.is_empty())
     }
 
@@ -261,14 +286,5 @@ impl MeshSource for PlyReader {
 
     fn vertex_count(&self) -> Option<u64> {
         Some(self.positions.len())
-    }
-}
-
-/// A colour channel as a byte: whole numbers by their upper bits, fractions of one by scale.
-fn channel_value(number: f64, scalar: Scalar) -> u8 {
-    match scalar {
-        Scalar::F32 | Scalar::F64 => (number * 255.0).round() as u8,
-        Scalar::I16 | Scalar::U16 => (number / 256.0) as u8,
-        _ => number as u8,
     }
 }
