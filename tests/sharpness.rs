@@ -1,0 +1,131 @@
+//! Corners, planes and fill rules: the output where it is known exactly.
+
+mod support;
+
+use brickmend::mesh::shapes::{Corners, Random, cuboid, sphere, volume};
+use brickmend::repair::{Outcome, Settings};
+use brickmend::sign::FillRule;
+use glam::DVec3;
+
+use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
+use crate::support::soups::{specks, turned_cube};
+use crate::support::surface::Surface;
+
+#[test]
+fn corners_of_turned_cubes_stay_sharp() {
+    let mut random = Random::new(21);
+    for pose in 0..20 {
+        let (soup, turn, by) = turned_cube(&mut random);
+        let (outcome, surface) = repair_soup(&soup, &at_depth(5)).expect("a result");
+        assert_eq!(outcome.patch.odd_faces, 0);
+        for bits in 0..8 {
+            let sign = |bit: i32| if bits & bit == 0 { -1.0 } else { 1.0 };
+            let corner = turn * DVec3::new(sign(1), sign(2), sign(4)) + by;
+            let distances = surface.vertices.iter().map(|&v| DVec3::from(v).distance(corner));
+            let off = distances.fold(f64::INFINITY, f64::min) / outcome.cell_size;
+            assert!(off < 1e-3, "pose {pose}: corner {bits} is {off} cells off");
+        }
+        assert!((surface.proof.volume / 8.0 - 1.0).abs() < 1e-3, "{}", surface.proof.volume);
+    }
+}
+
+#[test]
+fn every_vertex_of_an_axis_parallel_cube_lies_on_its_planes_to_the_bit() {
+    let workshop = Workshop::new();
+    for (lo, hi) in [([-1.0_f32; 3], [1.0_f32; 3]), ([0.3, -1.7, 2.1], [1.5, -0.4, 3.2])] {
+        let soup = cuboid(lo.map(f64::from), hi.map(f64::from));
+        let input = workshop.write(&soup, Encoding::BinaryStl);
+        for extension in ["ply", "stl"] {
+            let repaired = workshop
+                .repair(&input, extension, &at_depth(6), &Default::default())
+                .expect("a result");
+            let surface = Surface::read_proven(&repaired.path, FillRule::Solid);
+            for vertex in &surface.vertices {
+                let on_plane = (0..3)
+                    .any(|a| vertex[a] == f64::from(lo[a]) || vertex[a] == f64::from(hi[a]));
+                assert!(on_plane, "{vertex:?} is on no plane of {lo:?} to {hi:?}");
+            }
+            let corners = surface.vertices.iter().filter(|v| {
+                (0..3).all(|a| v[a] == f64::from(lo[a]) || v[a] == f64::from(hi[a]))
+            });
+            assert_eq!(corners.count(), 8);
+        }
+    }
+}
+
+fn with_rule(soup: &[Corners], rule: FillRule, depth: u32) -> (Outcome, Surface) {
+    let settings = Settings { fill_rule: rule, ..at_depth(depth) };
+    repair_soup(soup, &settings).expect("a result")
+}
+
+/// Two boxes of 1 x 1 x 1 that share a quarter of each.
+fn overlapping_boxes() -> Vec<Corners> {
+    let mut soup = cuboid([0.0; 3], [1.0; 3]);
+    soup.extend(cuboid([0.5, 0.5, 0.0], [1.5, 1.5, 1.0]));
+    soup
+}
+
+#[test]
+fn solid_unites_overlapping_boxes_and_evenodd_hollows_them() {
+    let soup = overlapping_boxes();
+    let (outcome, surface) = with_rule(&soup, FillRule::Solid, 6);
+    assert_eq!(outcome.patch.odd_faces, 0);
+    assert!((surface.proof.volume - 1.75).abs() < 1.75e-2, "{}", surface.proof.volume);
+    assert_eq!((surface.proof.components, surface.proof.euler_characteristic), (1, 2));
+    let (_, hollow) = with_rule(&soup, FillRule::Evenodd, 6);
+    assert!((hollow.proof.volume - 1.5).abs() < 2e-2, "{}", hollow.proof.volume);
+}
+
+#[test]
+fn solid_fills_a_cavity_and_evenodd_keeps_it() {
+    let mut soup = cuboid([-1.0; 3], [1.0; 3]);
+    soup.extend(cuboid([-0.5; 3], [0.5; 3]));
+    let (filled, surface) = with_rule(&soup, FillRule::Solid, 6);
+    assert!((surface.proof.volume - 8.0).abs() < 1e-2, "{}", surface.proof.volume);
+    assert_eq!((surface.proof.components, surface.proof.euler_characteristic), (1, 2));
+    assert!(filled.reasons.iter().any(|r| r.contains("filled")), "{:?}", filled.reasons);
+    let (_, hollow) = with_rule(&soup, FillRule::Evenodd, 6);
+    assert!((hollow.proof.volume - 7.0).abs() < 1e-2, "{}", hollow.proof.volume);
+    assert_eq!((hollow.proof.components, hollow.proof.euler_characteristic), (2, 4));
+}
+
+/// A sphere, without its cap above `top` (1 leaves it whole).
+fn open_sphere(centre: [f64; 3], radius: f64, top: f64) -> Vec<Corners> {
+    let mut soup = sphere(centre, radius, 24);
+    soup.retain(|corners| corners.iter().any(|c| c[2] - centre[2] < top * radius));
+    soup
+}
+
+#[test]
+fn the_place_in_the_grid_does_not_change_the_volume() {
+    let radius = 0.3;
+    let mut random = Random::new(31);
+    for top in [1.1, 0.75] {
+        let exact = {
+            let open = open_sphere([0.5; 3], radius, top);
+            let rim = open.iter().flatten().map(|c| c[2]).fold(f64::MIN, f64::max) - 0.5;
+            let h = radius - rim;
+            let cap = std::f64::consts::PI * h * h * (3.0 * radius - h) / 3.0;
+            4.0 / 3.0 * std::f64::consts::PI * radius.powi(3) - cap
+        };
+        for place in 0..10 {
+            // Specks hold the grid where it is; the sphere moves by up to five cells and a half.
+            let centre = random.point().map(|x| 0.5 + 0.095 * x);
+            let mut soup = open_sphere(centre, radius, top);
+            soup.extend(specks());
+            let (outcome, surface) = repair_soup(&soup, &at_depth(6)).expect("a result");
+            assert_eq!(outcome.patch.odd_faces == 0, top > 1.0);
+            let found = surface.proof.volume;
+            let disc = std::f64::consts::PI * radius * radius * (1.0 - top * top).max(0.0);
+            // A hundredth, and half a cell over the patch.
+            let error = 0.01 * exact + 0.5 * disc * outcome.cell_size;
+            assert!((found - exact).abs() < error, "{place} {top}: {found} {exact} {error}");
+        }
+    }
+}
+
+#[test]
+fn shapes_are_what_these_tests_take_them_for() {
+    assert!((volume(&overlapping_boxes()) - 2.0).abs() < 1e-12);
+    assert!(volume(&specks()) > 0.0);
+}
