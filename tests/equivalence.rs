@@ -24,10 +24,7 @@ fn variants() -> Vec<(&'static str, Limits)> {
         ("eight threads", Limits { threads: 8, ..plain.clone() }),
         ("64 MiB", Limits { max_memory_bytes: small, ..plain.clone() }),
         ("16 KiB a share", Limits { share_bytes, ..plain.clone() }),
-        (
-            "all at once",
-            Limits { threads: 8, max_memory_bytes: small, share_bytes, ..plain },
-        ),
+        ("all at once", Limits { threads: 8, max_memory_bytes: small, share_bytes, ..plain }),
     ]
 }
 

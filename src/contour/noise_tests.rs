@@ -68,8 +68,7 @@ impl Field {
     }
 
     fn is_inside(&self, at: [usize; 3]) -> bool {
-        at.iter().all(|c| NOISE.contains(c))
-            && self.random_at(3, at).share() < self.inside_share
+        at.iter().all(|c| NOISE.contains(c)) && self.random_at(3, at).share() < self.inside_share
     }
 
     /// A patch, or a plane of any direction through the edge, seen from the brick at `base`.

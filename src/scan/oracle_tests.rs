@@ -130,8 +130,8 @@ fn cell_of(
 ) -> i64 {
     let turn = i128::from(run.signum());
     let below = i128::from(run.abs());
-    let above = i128::from(from[across]) * below
-        + i128::from(plane - from[axis]) * i128::from(rise) * turn;
+    let above =
+        i128::from(from[across]) * below + i128::from(plane - from[axis]) * i128::from(rise) * turn;
     let step = below * i128::from(cell);
     let number = above.div_euclid(step) as i64;
     if above.rem_euclid(step) != 0 {

@@ -8,6 +8,7 @@ use brickmend::io::{Format, format_of_extension};
 use brickmend::mesh::shapes::Corners;
 use brickmend::monitor::Void;
 use brickmend::repair::{Depth, Limits, Outcome, RepairError, Settings, repair};
+use brickmend::sign::FillRule;
 use tempfile::TempDir;
 
 use crate::support::surface::Surface;
@@ -39,12 +40,28 @@ pub fn at_depth(depth: u32) -> Settings {
 }
 
 /// Repairs a soup from OBJ to PLY and checks every guarantee on the written file.
-pub fn repair_soup(soup: &[Corners], settings: &Settings) -> Result<(Outcome, Surface), RepairError> {
+pub fn repair_soup(
+    soup: &[Corners],
+    settings: &Settings,
+) -> Result<(Outcome, Surface), RepairError> {
     let workshop = Workshop::new();
     let input = workshop.write(soup, Encoding::Obj);
     let repaired = workshop.repair(&input, "ply", settings, &Limits::default())?;
     let surface = Surface::read_proven(&repaired.path, settings.fill_rule);
     Ok((repaired.outcome, surface))
+}
+
+/// A result with every promise kept, or the word that nothing is left of the soup.
+pub fn repair_anything(soup: &[Corners], encoding: Encoding, rule: FillRule, depth: u32) {
+    let workshop = Workshop::new();
+    let input = workshop.write(soup, encoding);
+    let mut settings = at_depth(depth);
+    settings.fill_rule = rule;
+    match workshop.repair(&input, "ply", &settings, &Default::default()) {
+        Ok(repaired) => drop(Surface::read_proven(&repaired.path, rule)),
+        Err(RepairError::EmptyResult { .. } | RepairError::NoTriangle { .. }) => {}
+        Err(error) => panic!("{error}"),
+    }
 }
 
 impl Workshop {
