@@ -51,8 +51,9 @@ def main():
     parser.add_argument("--judge", help="command to run on every output, {out} is its path")
     parser.add_argument("--format", default="ply")
     parser.add_argument("--only", default="", help="names that contain this")
-    parser.add_argument("extra", nargs="*", help="arguments for repair, after --")
-    arguments = parser.parse_args()
+    words = sys.argv[1:]
+    split = words.index("--") if "--" in words else len(words)
+    arguments, extra = parser.parse_args(words[:split]), words[split + 1 :]
     arguments.out.mkdir(parents=True, exist_ok=True)
     print("| model | exit | s | MiB | depth | triangles | area in → out | volume in → out | ratio | look |")
     print("|---|---|---|---|---|---|---|---|---|---|")
@@ -62,7 +63,7 @@ def main():
             continue
         output = arguments.out / f"{model.stem}.{arguments.format}"
         output.unlink(missing_ok=True)
-        code, seconds, outcome, message = repair(arguments.brickmend, model, output, arguments.extra)
+        code, seconds, outcome, message = repair(arguments.brickmend, model, output, extra)
         failures += code not in (0, 65)
         print(row(model.name, code, seconds, outcome, message), flush=True)
         if arguments.judge and output.exists():

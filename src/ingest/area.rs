@@ -54,11 +54,15 @@ impl AreaHistogram {
         self.area += area;
         self.signed_volume += p.dot(q.cross(r)) / 6.0;
         if self.longest > 0.0 && self.longest.is_finite() {
-            let middle = (p + q + r) / 3.0;
             for axis in 0..3 {
-                let from_lo = middle[axis] + (self.centre[axis] - self.bounds.lo[axis]);
-                let slice = (from_lo / self.longest * SLICES as f64) as usize;
-                self.slices[axis][slice.min(SLICES - 1)] += area;
+                let slice = |coordinate: f64| {
+                    let from_lo = coordinate + (self.centre[axis] - self.bounds.lo[axis]);
+                    ((from_lo / self.longest * SLICES as f64) as usize).min(SLICES - 1)
+                };
+                let first = slice(p[axis].min(q[axis]).min(r[axis]));
+                let last = slice(p[axis].max(q[axis]).max(r[axis]));
+                let each = area / (last - first + 1) as f64;
+                self.slices[axis][first..=last].iter_mut().for_each(|slice| *slice += each);
             }
         }
     }

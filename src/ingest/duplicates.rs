@@ -14,7 +14,7 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::bins::{BinEntry, Bins};
-use crate::octree::{BrickKey, Domain, SoupTriangle};
+use crate::octree::{BrickKey, Domain, LATTICE_BITS, SoupTriangle};
 use crate::store::{
     Record, Resources, Scratch, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
 };
@@ -80,12 +80,12 @@ type Point = [u32; 3];
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Triple {
-    corners: [Point; 3],
-    source: u32,
+    corners: [u64; 4],
+    source: u64,
 }
 
 impl Record for Triple {
-    type Key = ([Point; 3], u32);
+    type Key = ([u64; 4], u64);
     fn key(&self) -> Self::Key {
         (self.corners, self.source)
     }
@@ -95,7 +95,7 @@ impl Record for Triple {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct EdgeUse {
-    ends: [Point; 2],
+    ends: [u64; 3],
     group: u32,
     source: u32,
 }
@@ -103,10 +103,41 @@ struct EdgeUse {
 const NO_GROUP: u32 = u32::MAX;
 
 impl Record for EdgeUse {
-    type Key = ([Point; 2], u32, u32);
+    type Key = ([u64; 3], u32, u32);
     fn key(&self) -> Self::Key {
         (self.ends, self.group, self.source)
     }
+}
+
+/// Three corners of 84 bits, one bit short of four words: comparing words is comparing corners.
+fn pack_corners([p, q, r]: [Point; 3]) -> [u64; 4] {
+    let [p, q, r] = [p, q, r].map(pack_point);
+    let mask = (1 << 63) - 1;
+    [
+        (p >> 21) as u64,
+        ((p << 42 | q >> 42) & mask) as u64,
+        ((q << 21 | r >> 63) & mask) as u64,
+        (r & mask) as u64,
+    ]
+}
+
+/// Two ends of 84 bits in three words of 56.
+fn pack_ends([p, q]: [Point; 2]) -> [u64; 3] {
+    let [p, q] = [p, q].map(pack_point);
+    let mask = (1 << 56) - 1;
+    [(p >> 28) as u64, ((p << 28 | q >> 56) & mask) as u64, (q & mask) as u64]
+}
+
+fn pack_point(point: Point) -> u128 {
+    point.iter().fold(0, |bits, &c| bits << LATTICE_BITS | u128::from(c))
+}
+
+fn unpack_ends([high, middle, low]: [u64; 3]) -> [Point; 2] {
+    let mask = (1_u128 << LATTICE_BITS) - 1;
+    let unpack = |bits: u128| [2, 1, 0].map(|i| (bits >> (i * LATTICE_BITS) & mask) as u32);
+    let first = u128::from(high) << 28 | u128::from(middle) >> 28;
+    let second = u128::from(middle & ((1 << 28) - 1)) << 56 | u128::from(low);
+    [unpack(first), unpack(second)]
 }
 
 /// A copy: group (its smallest source), brick, source.
@@ -238,7 +269,8 @@ fn examine_bin(
             if owner(domain, corners[0]) == entry.brick && is_degenerate(corners) {
                 found.stats.degenerate_triangles += 1;
             }
-            triples.push(Triple { corners, source: triangle.source })?;
+            let source = u64::from(triangle.source);
+            triples.push(Triple { corners: pack_corners(corners), source })?;
         }
     }
     find_copies(triples, entry.brick, &mut found.copies)?;
@@ -258,7 +290,7 @@ fn examine_bin(
                 let (a, b) = (corners[i], corners[(i + 1) % 3]);
                 let ends = [a.min(b), a.max(b)];
                 if a != b && owner(domain, ends[0]) == entry.brick {
-                    edges.push(EdgeUse { ends, group, source })?;
+                    edges.push(EdgeUse { ends: pack_ends(ends), group, source })?;
                 }
             }
         }
@@ -286,12 +318,13 @@ fn find_copies(
     let mut in_group = false;
     while let Some(triple) = sorted.next()? {
         match first {
-            Some(group) if group.corners == triple.corners => {
+            Some(known) if known.corners == triple.corners => {
+                let group = known.source as u32;
                 if !in_group {
-                    copies.push(Copy3 { brick, group: group.source, source: group.source });
+                    copies.push(Copy3 { brick, group, source: group });
                     in_group = true;
                 }
-                copies.push(Copy3 { brick, group: group.source, source: triple.source });
+                copies.push(Copy3 { brick, group, source: triple.source as u32 });
             }
             _ => {
                 first = Some(triple);
@@ -309,13 +342,13 @@ fn judge_edges(
     found: &mut BinFindings,
 ) -> Result<(), StoreError> {
     let mut sorted = edges.finish()?;
-    let mut ends = [[u32::MAX; 3]; 2];
+    let mut ends = [u64::MAX; 3];
     let mut others = 0_u64;
     let mut groups: Vec<u32> = Vec::new();
     loop {
         let edge = sorted.next()?;
         if edge.is_none_or(|edge| edge.ends != ends) {
-            finish_edge(ends, others, &groups, unit, found);
+            finish_edge(unpack_ends(ends), others, &groups, unit, found);
             others = 0;
             groups.clear();
         }
@@ -411,4 +444,26 @@ fn collect_drops(
         }
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn point() -> impl Strategy<Value = Point> {
+        proptest::array::uniform3(0..1_u32 << LATTICE_BITS)
+    }
+
+    proptest! {
+        #[test]
+        fn packed_keys_order_and_unpack_like_points(
+            a in proptest::array::uniform3(point()), b in proptest::array::uniform3(point()),
+        ) {
+            prop_assert_eq!(pack_corners(a).cmp(&pack_corners(b)), a.cmp(&b));
+            let (e, f) = ([a[0], a[1]], [b[0], b[1]]);
+            prop_assert_eq!(pack_ends(e).cmp(&pack_ends(f)), e.cmp(&f));
+            prop_assert_eq!(unpack_ends(pack_ends(e)), e);
+        }
+    }
 }

@@ -164,7 +164,7 @@ mod tests {
     proptest! {
         #[test]
         fn points_of_the_triangle_lie_in_touched_bricks(
-            corners in proptest::array::uniform3(proptest::array::uniform3(1_000_000..200_000_000_i32)),
+            corners in proptest::array::uniform3(proptest::array::uniform3(1_000_000..120_000_000_i32)),
             weights in proptest::collection::vec((0.0..1.0_f64, 0.0..1.0_f64), 200),
         ) {
             let domain = unit_domain();
@@ -185,7 +185,8 @@ mod tests {
     fn a_large_flat_triangle_touches_about_its_area_in_bricks() {
         let domain = unit_domain();
         let b = domain.brick_units() as i32;
-        let corners = [[b, b, b * 4 + 9], [b * 15, b, b * 4 + 9], [b, b * 15, b * 4 + 9]];
+        let (near, far, z) = (b + 9, b * 15 - 9, b * 4 + 9);
+        let corners = [[near, near, z], [far, near, z], [near, far, z]];
         let count = touched(&domain, corners).len();
         assert!((100..130).contains(&count), "{count}");
     }

@@ -96,7 +96,8 @@ impl Domain {
     pub fn around(model: &SnapBox, depth: u32, single_precision: bool) -> Result<Self, u32> {
         let domain = Self::fitted(model, depth, single_precision);
         match domain.wanted_cell_units(model) {
-            units if units >= MIN_CELL_UNITS as f64 => Ok(domain),
+            // Where f64 itself is that coarse, the model has no finer detail to lose.
+            units if units >= MIN_CELL_UNITS as f64 || !single_precision => Ok(domain),
             _ if depth == 4 => Err(0),
             _ => {
                 Err(Self::around(model, depth - 1, single_precision)
@@ -269,7 +270,8 @@ mod tests {
         let deepest = Domain::around(&model, 12, true).expect_err("f32 is too coarse there");
         assert!((4..12).contains(&deepest));
         let domain = Domain::around(&model, deepest, true).expect("this depth would do");
-        for q in [0, 12_345, 1 << 20] {
+        let side = i64::from(domain.cell_units) << deepest;
+        for q in [0, 12_345, side / 2, side] {
             let [x, _, _] = domain.to_model([q; 3]);
             assert_eq!(f64::from(x as f32), x);
         }

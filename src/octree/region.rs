@@ -109,6 +109,10 @@ fn root(parents: &mut [u16], mut at: u16) -> u16 {
 }
 
 fn join(parents: &mut [u16], a: u16, b: u16) {
+    // Most neighbours are united already.
+    if parents[a as usize] == parents[b as usize] {
+        return;
+    }
     let (a, b) = (root(parents, a), root(parents, b));
     parents[a.max(b) as usize] = a.min(b);
 }

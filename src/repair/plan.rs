@@ -52,7 +52,7 @@ impl MemoryPlan {
         let free = budget - BASE_BYTES - threads as u64 * THREAD_BYTES;
         // Two brick files may be open at a time; the rest is slack for what allocators keep.
         let windows = (free / 8 / WINDOW_BYTES).clamp(4, MAX_WINDOWS);
-        let share = limits.share_bytes.unwrap_or(free / 2);
+        let share = limits.share_bytes.unwrap_or(free / 4 * 3);
         Ok(Self { threads, share_bytes: share, cached_windows: windows as usize })
     }
 }

@@ -44,7 +44,7 @@ pub struct Collector {
     planes: Vec<SourcePlane>,
     chunk: Vec<Hit>,
     rows: Vec<u32>,
-    sorted: Vec<Placed>,
+    sorted: Vec<Hit>,
     edges: Vec<EdgeHits>,
     owned_hits: u64,
 }
@@ -94,43 +94,79 @@ impl Collector {
 
     /// Ends the brick.
     pub fn finish(&mut self) -> HitBrick {
-        self.reduce();
-        let mut brick = HitBrick::default();
-        brick.edges.reserve_exact(self.edges.len());
-        for edge in &self.edges {
-            brick.edges.push(HitEdge::new(edge.edge, edge.class, edge.kept, edge.signed_sum));
-            brick.hits.extend(edge.hits[..edge.kept].iter().map(|placed| placed.hit.plane));
+        if !self.edges.is_empty() {
+            self.reduce();
+            return self.brick_of_edges();
         }
-        brick.planes.extend_from_slice(&self.planes);
+        self.sort_chunk();
+        let mut brick = HitBrick::default();
+        brick.edges.reserve_exact(self.sorted.len());
+        brick.hits.reserve_exact(self.sorted.len());
+        let mut start = 0;
+        while start < self.sorted.len() {
+            let edge = self.sorted[start].edge;
+            let count = self.sorted[start..].iter().take_while(|hit| hit.edge == edge).count();
+            if let [hit] = self.sorted[start..start + count] {
+                brick.edges.push(HitEdge::new(edge, 1, 1, if hit.up { 1 } else { -1 }));
+                brick.hits.push(hit.plane);
+            } else {
+                let group = self.place(start, count);
+                EdgeHits::merge(None, &group).push_to(&mut brick);
+            }
+            self.count_owned(edge, count);
+            start += count;
+        }
+        self.chunk.clear();
+        brick.planes = prune_planes(&self.planes, &mut brick.hits);
         brick
     }
 
-    /// Sorts the chunk, merges it into the edges and forgets planes that nobody keeps.
+    fn brick_of_edges(&mut self) -> HitBrick {
+        let mut brick = HitBrick::default();
+        self.edges.iter().for_each(|edge| edge.push_to(&mut brick));
+        brick.planes = prune_planes(&self.planes, &mut brick.hits);
+        brick
+    }
+
+    /// Merges a full chunk into the edges and forgets planes that nobody keeps.
     fn reduce(&mut self) {
         self.sort_chunk();
         let old = std::mem::take(&mut self.edges);
         let mut merged = Vec::with_capacity(old.len() + self.sorted.len());
         let mut before = old.into_iter().peekable();
-        for group in self.sorted.chunk_by(|a, b| a.hit.edge == b.hit.edge) {
-            let edge = group[0].hit.edge;
+        let mut start = 0;
+        while start < self.sorted.len() {
+            let edge = self.sorted[start].edge;
+            let count = self.sorted[start..].iter().take_while(|hit| hit.edge == edge).count();
             while let Some(earlier) = before.next_if(|earlier| earlier.edge < edge) {
                 merged.push(earlier);
             }
             let earlier = before.next_if(|earlier| earlier.edge == edge);
-            merged.push(EdgeHits::merge(earlier, group));
-            let (_, at) = edge_position(edge);
-            if at.iter().all(|&c| c < SIDE) {
-                self.owned_hits += group.len() as u64;
-            }
+            let group = self.place(start, count);
+            merged.push(EdgeHits::merge(earlier, &group));
+            self.count_owned(edge, count);
+            start += count;
         }
         merged.extend(before);
+        let mut hits: Vec<u32> =
+            merged.iter().flat_map(|e| &e.hits[..e.kept]).map(|placed| placed.hit.plane).collect();
+        self.planes = prune_planes(&self.planes, &mut hits);
+        let mut renumbered = hits.into_iter();
+        for placed in merged.iter_mut().flat_map(|edge| &mut edge.hits[..edge.kept]) {
+            placed.hit.plane = renumbered.next().unwrap_or(NO_PLANE);
+        }
         self.edges = merged;
         self.chunk.clear();
-        self.sorted.clear();
-        self.prune_planes();
     }
 
-    /// Counting sort by row, then by edge, place and plane within a row.
+    fn count_owned(&mut self, edge: u32, hits: usize) {
+        let (_, at) = edge_position(edge);
+        if at.iter().all(|&c| c < SIDE) {
+            self.owned_hits += hits as u64;
+        }
+    }
+
+    /// Counting sort by row, then by edge and plane within a row.
     fn sort_chunk(&mut self) {
         self.rows.fill(0);
         for hit in &self.chunk {
@@ -139,53 +175,50 @@ impl Collector {
         for row in 0..ALL_ROWS {
             self.rows[row + 1] += self.rows[row];
         }
-        let nothing = Placed { hit: Hit { edge: 0, plane: 0, up: false }, offset: 0.0 };
         self.sorted.clear();
-        self.sorted.resize(self.chunk.len(), nothing);
+        self.sorted.resize(self.chunk.len(), Hit { edge: 0, plane: 0, up: false });
         for &hit in &self.chunk {
-            let (axis, at) = edge_position(hit.edge);
-            let plane = &self.planes[hit.plane as usize];
-            let offset = plane.offset_on_edge(axis, at, self.cell_units);
             let slot = &mut self.rows[hit.edge as usize / LINES];
-            self.sorted[*slot as usize] = Placed { hit, offset };
+            self.sorted[*slot as usize] = hit;
             *slot += 1;
         }
         let mut start = 0;
         for &end in &self.rows[..ALL_ROWS] {
             let row = &mut self.sorted[start as usize..end as usize];
             if row.len() > 1 {
-                row.sort_unstable_by(|a, b| {
-                    (a.hit.edge.cmp(&b.hit.edge))
-                        .then(a.offset.total_cmp(&b.offset))
-                        .then(a.hit.plane.cmp(&b.hit.plane))
-                });
+                row.sort_unstable_by_key(|hit| (hit.edge, hit.plane));
             }
             start = end;
         }
     }
 
-    fn prune_planes(&mut self) {
-        let mut number = vec![NO_PLANE; self.planes.len()];
-        for edge in &self.edges {
-            for placed in &edge.hits[..edge.kept] {
-                number[placed.hit.plane as usize] = 0;
-            }
-        }
-        let mut next = 0;
-        for (old, new) in number.iter_mut().enumerate() {
-            if *new != NO_PLANE {
-                *new = next;
-                self.planes[next as usize] = self.planes[old];
-                next += 1;
-            }
-        }
-        self.planes.truncate(next as usize);
-        for edge in &mut self.edges {
-            for placed in &mut edge.hits[..edge.kept] {
-                placed.hit.plane = number[placed.hit.plane as usize];
-            }
-        }
+    /// The hits of one edge with their places on it, from its lower end up.
+    fn place(&self, start: usize, count: usize) -> Vec<Placed> {
+        let hits = &self.sorted[start..start + count];
+        let mut placed: Vec<Placed> = hits
+            .iter()
+            .map(|&hit| {
+                let (axis, at) = edge_position(hit.edge);
+                let plane = &self.planes[hit.plane as usize];
+                Placed { hit, offset: plane.offset_on_edge(axis, at, self.cell_units) }
+            })
+            .collect();
+        placed.sort_by(|a, b| a.offset.total_cmp(&b.offset));
+        placed
     }
+}
+
+/// The planes that `hits` use, in their old order; `hits` are renumbered.
+fn prune_planes(planes: &[SourcePlane], hits: &mut [u32]) -> Vec<SourcePlane> {
+    let mut number = vec![NO_PLANE; planes.len()];
+    hits.iter().for_each(|&plane| number[plane as usize] = 0);
+    let mut kept = Vec::with_capacity(planes.len());
+    for (plane, number) in planes.iter().zip(&mut number).filter(|(_, n)| **n != NO_PLANE) {
+        *number = kept.len() as u32;
+        kept.push(*plane);
+    }
+    hits.iter_mut().for_each(|plane| *plane = number[*plane as usize]);
+    kept
 }
 
 impl EdgeHits {
@@ -225,5 +258,10 @@ impl EdgeHits {
             _ => all.hits = [candidates[0], candidates[count / 2], candidates[count - 1]],
         }
         all
+    }
+
+    fn push_to(&self, brick: &mut HitBrick) {
+        brick.edges.push(HitEdge::new(self.edge, self.class, self.kept, self.signed_sum));
+        brick.hits.extend(self.hits[..self.kept].iter().map(|placed| placed.hit.plane));
     }
 }

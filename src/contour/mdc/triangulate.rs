@@ -74,11 +74,23 @@ impl Quad {
         if side == 0 {
             return opposite(q) && opposite(s);
         }
-        [(q, s), (s, q)].into_iter().any(|(beyond, pierced)| {
-            orientation(p, r, upper, beyond) == side
+        // The edge passes the diagonal on the side of the vertex whose triangle it pierces.
+        let pairs = if self.passes_fourth(first) { [(q, s), (s, q)] } else { [(s, q), (q, s)] };
+        pairs.into_iter().any(|(beyond, pierced)| {
+            opposite(pierced)
+                && orientation(p, r, upper, beyond) == side
                 && orientation(p, r, beyond, lower) == side
-                && opposite(pierced)
         })
+    }
+
+    /// Whether the edge lies on the fourth vertex's side of the diagonal from `first`.
+    fn passes_fourth(&self, first: usize) -> bool {
+        let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        let [from, to] = [0, 2].map(|i| {
+            let corner = self.corners[(first + i) % 4];
+            [u, v].map(|a| (corner[a] - self.crossing[a]) as f64)
+        });
+        from[0] * to[1] - from[1] * to[0] < 0.0
     }
 
     /// How far from the crossing the surface cut along the diagonal from `first` meets the edge.
@@ -89,9 +101,7 @@ impl Quad {
             [u, v, self.axis].map(|a| (corner[a] - self.crossing[a]) as f64)
         };
         let (from, to) = (local(0), local(2));
-        // The edge is at the origin: on which side of the diagonal does it lie?
-        let side = from[0] * to[1] - from[1] * to[0];
-        let apex = if side < 0.0 { local(3) } else { local(1) };
+        let apex = if self.passes_fourth(first) { local(3) } else { local(1) };
         height_at_origin(from, to, apex).abs()
     }
 }
