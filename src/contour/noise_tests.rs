@@ -225,5 +225,5 @@ fn flipped_faces_occur_in_noise_and_are_needed() {
     let field = Field { seed: 7, inside_share: 0.5, patch_share: 1.0 };
     let found = contour(&field, Backing::Memory, 1);
     assert_sound(&found, "all patched");
-    assert!(found.stats.flipped_faces > 0 && found.stats.flipped_faces % 2 == 0);
+    assert!(found.stats.flipped_faces > 0 && found.stats.flipped_faces.is_multiple_of(2));
 }
