@@ -15,6 +15,8 @@
 
 pub mod mdc;
 
+#[cfg(test)]
+mod noise_tests;
 mod write;
 
 use serde::{Deserialize, Serialize};

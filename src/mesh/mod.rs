@@ -2,6 +2,8 @@
 //!
 //! Formats end at [`MeshSource`] and [`MeshSink`]; no stage knows a file format.
 
+pub mod shapes;
+
 mod batch;
 mod sink;
 mod source;

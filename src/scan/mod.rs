@@ -13,6 +13,8 @@
 
 mod collect;
 mod convert;
+#[cfg(test)]
+mod oracle_tests;
 
 use serde::{Deserialize, Serialize};
 

@@ -1,4 +1,11 @@
-//! What the tests of whole repairs share.
+//! What the tests of whole repairs share: soups, ways to break them, files, and judgement.
+
+#![allow(dead_code, reason = "each test file uses its own part")]
+
+pub mod breakage;
+pub mod run;
+pub mod soups;
+pub mod surface;
 
 use std::path::{Path, PathBuf};
 

@@ -1,0 +1,229 @@
+//! The surface of noise: every corner of the grid inside or outside by chance.
+//!
+//! Noise has every sign pattern at every place, also at brick borders, so whatever is not
+//! manifold by construction shows here. The judge is the proof, which shares no code with this.
+
+use std::convert::Infallible;
+
+use glam::DVec3;
+
+use crate::contour::mdc::table::{FLIPPED, TABLE};
+use crate::contour::{ContourOptions, ContourStats, Method, place_vertices, write_surface};
+use crate::mesh::shapes::{ListedTriangles, Random};
+use crate::mesh::{MeshSink, SinkStats};
+use crate::monitor::Void;
+use crate::octree::{
+    BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SnapBox,
+    SourcePlane, decode_cells, edge_position, encode,
+};
+use crate::store::{Backing, BrickFile, BrickWriter, Resources, Scratch};
+use crate::verify::{Outward, Proof, ProofOptions, prove};
+
+/// The grid of the tests: 2 x 2 x 2 bricks.
+const DEPTH: u32 = 6;
+/// Corners of the grid from here up to, not including, there may be inside: all bricks share them.
+const NOISE: std::ops::Range<usize> = 16..48;
+
+/// A sink that keeps everything.
+#[derive(Default)]
+struct Kept {
+    vertices: Vec<[f64; 3]>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl MeshSink for Kept {
+    type Error = Infallible;
+
+    fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), Infallible> {
+        self.vertices.extend_from_slice(positions);
+        Ok(())
+    }
+
+    fn triangles(
+        &mut self,
+        indices: &[[u32; 3]],
+        corners: &[[[f64; 3]; 3]],
+    ) -> Result<(), Infallible> {
+        assert_eq!(indices.len(), corners.len());
+        self.triangles.extend_from_slice(indices);
+        Ok(())
+    }
+
+    fn finish(self: Box<Self>) -> Result<SinkStats, Infallible> {
+        Ok(SinkStats::default())
+    }
+}
+
+/// Signs of all corners of the grid, and hits on its edges that look the same from every brick.
+struct Field {
+    seed: u64,
+    inside_share: f64,
+    patch_share: f64,
+}
+
+impl Field {
+    fn random_at(&self, kind: u64, at: [usize; 3]) -> Random {
+        let place = at.iter().fold(kind, |key, &c| key << 8 | c as u64);
+        Random::new(self.seed.wrapping_mul(0x1_0000_0001) ^ place << 20 ^ place)
+    }
+
+    fn is_inside(&self, at: [usize; 3]) -> bool {
+        at.iter().all(|c| NOISE.contains(c)) && self.random_at(3, at).share() < self.inside_share
+    }
+
+    /// A patch, or a plane of any direction through the edge, seen from the brick at `base`.
+    fn hit(&self, axis: usize, at: [usize; 3], base: [usize; 3], cell: f64) -> Hit {
+        let mut random = self.random_at(axis as u64, at);
+        // Some hits lie at the very ends of their edges.
+        let offset = match random.below(4) {
+            0 => random.within(0.0, 1e-3),
+            1 => 1.0 - random.within(1e-6, 1e-3),
+            _ => random.share(),
+        };
+        if random.share() < self.patch_share {
+            return Hit::Patch(PATCH | (offset * 65535.0) as u32);
+        }
+        let mut point = DVec3::from(std::array::from_fn(|a| (at[a] - base[a]) as f64));
+        point[axis] += offset;
+        let normal = (DVec3::from(random.point()) + DVec3::AXES[axis] * 1e-3).normalize_or_zero();
+        let normal = normal.as_vec3();
+        let offset = normal.as_dvec3().dot(point * cell);
+        Hit::Plane(SourcePlane { offset, normal: normal.to_array(), ..SourcePlane::default() })
+    }
+
+    fn brick(&self, position: [u32; 3], cell: f64) -> SignBrick {
+        let base = position.map(|c| c as usize * SIDE);
+        let mut corners = CornerBits::default();
+        for (row, bits) in corners.rows.iter_mut().enumerate() {
+            for x in 0..LINES {
+                let at = [base[0] + x, base[1] + row % LINES, base[2] + row / LINES];
+                *bits |= u64::from(self.is_inside(at)) << x;
+            }
+        }
+        let mut marks = EdgeBits::default();
+        marks.set_differences(&corners);
+        let base_inside = corners.get([0; 3]);
+        let mut brick = SignBrick { base_inside, ..SignBrick::default() };
+        marks.for_each(|edge| {
+            let (axis, at) = edge_position(edge);
+            let at = std::array::from_fn(|a| base[a] + at[a]);
+            let plane = match self.hit(axis, at, base, cell) {
+                Hit::Patch(plane) => plane,
+                Hit::Plane(plane) => {
+                    brick.planes.push(plane);
+                    brick.planes.len() as u32 - 1
+                }
+            };
+            brick.crossings.push(Crossing { edge, plane });
+        });
+        brick
+    }
+}
+
+enum Hit {
+    Patch(u32),
+    Plane(SourcePlane),
+}
+
+/// What came of a field.
+struct Contoured {
+    kept: Kept,
+    proof: Proof,
+    stats: ContourStats,
+}
+
+fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scratch = Scratch::new(folder.path());
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    let resources = Resources {
+        scratch: &scratch,
+        pool: &pool,
+        share_bytes: 8 << 20,
+        cached_windows: 2,
+        backing,
+        monitor: &Void,
+    };
+    let unit = SnapBox { lo: [0.0; 3], hi: [1.0; 3] };
+    let domain = Domain::around(&unit, DEPTH, false).expect("room enough");
+    let mut writer = BrickWriter::create(&scratch, "signs", backing).expect("room");
+    for key in 0..8 {
+        let brick = field.brick(BrickKey(key).position(), f64::from(domain.cell_units));
+        writer.append(key, 0, &encode(&brick)).expect("room");
+    }
+    let signs = writer.finish(2).expect("room");
+    let options = ContourOptions { method: Method::Mdc, crease_deg: 12.0 };
+    let (cells, mut stats) =
+        place_vertices(&signs, &domain, &options, &resources).expect("sound bricks");
+    assert_vertices_lie_in_their_cells(&cells, &domain);
+    let mut kept = Kept::default();
+    write_surface(&cells, &domain, &options, &mut kept, &mut stats, &resources)
+        .expect("sound bricks");
+    let mut source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
+    let proof_options = ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked };
+    let proof = prove(&mut source, &scratch, &proof_options, &Void).expect("room");
+    Contoured { kept, proof, stats }
+}
+
+fn assert_vertices_lie_in_their_cells(cells: &BrickFile, domain: &Domain) {
+    let cell_units = i64::from(domain.cell_units);
+    for number in 0..cells.len() {
+        let view = cells.view(number).expect("readable");
+        let record = decode_cells(&view).expect("a cell brick");
+        let mut positions = record.positions.iter();
+        for cell in record.cells.iter().map(|cell| cell.to_native()) {
+            let (place, mask) = ((cell & 0x7fff) as usize, (cell >> 15 & 0xff) as usize);
+            let at = [place % SIDE, place / SIDE % SIDE, place / SIDE / SIDE];
+            let table = if cell >> 23 & 1 == 1 { &FLIPPED } else { &TABLE };
+            for position in positions.by_ref().take(usize::from(table[mask].count)) {
+                for a in 0..3 {
+                    let within = i64::from(position[a].to_native()) - at[a] as i64 * cell_units;
+                    assert!(0 < within && within < cell_units, "{within} of {cell_units}");
+                }
+            }
+        }
+        assert!(positions.next().is_none());
+    }
+}
+
+fn assert_sound(found: &Contoured, name: &str) {
+    let Contoured { kept, proof, stats } = found;
+    assert!(proof.holds(), "{name}: {:?}", proof.failures());
+    assert_eq!(proof.unused_vertices, 0, "{name}");
+    assert_eq!(stats.vertices, kept.vertices.len() as u64, "{name}");
+    assert_eq!(stats.triangles, kept.triangles.len() as u64, "{name}");
+    assert_eq!(stats.triangles, 2 * (stats.polygons + stats.fans), "{name}");
+    assert!(stats.multi_cells > 0 && stats.fans > 0, "{name}: not much of a noise");
+}
+
+#[test]
+fn the_surface_of_noise_is_closed_and_manifold() {
+    for (seed, inside_share, patch_share) in
+        [(1, 0.5, 0.5), (2, 0.2, 0.5), (3, 0.5, 0.0), (4, 0.2, 0.0), (5, 0.8, 0.1)]
+    {
+        let field = Field { seed, inside_share, patch_share };
+        let found = contour(&field, Backing::Memory, 1);
+        assert_sound(&found, &format!("{inside_share} inside, {patch_share} patched"));
+        assert!(found.proof.triangles > 10_000);
+    }
+}
+
+#[test]
+fn noise_in_mapped_bricks_and_on_more_threads_is_the_same() {
+    let field = Field { seed: 6, inside_share: 0.5, patch_share: 0.3 };
+    let one = contour(&field, Backing::Memory, 1);
+    assert_sound(&one, "in memory");
+    for (backing, threads) in [(Backing::Mapped, 1), (Backing::Mapped, 4), (Backing::Memory, 4)] {
+        let other = contour(&field, backing, threads);
+        assert!(one.kept.vertices == other.kept.vertices, "{backing:?} {threads}");
+        assert!(one.kept.triangles == other.kept.triangles, "{backing:?} {threads}");
+    }
+}
+
+#[test]
+fn flipped_faces_occur_in_noise_and_are_needed() {
+    let field = Field { seed: 7, inside_share: 0.5, patch_share: 1.0 };
+    let found = contour(&field, Backing::Memory, 1);
+    assert_sound(&found, "all patched");
+    assert!(found.stats.flipped_faces > 0 && found.stats.flipped_faces.is_multiple_of(2));
+}
