@@ -17,7 +17,7 @@ use crate::octree::{
     SourcePlane, decode_cells, edge_position, encode,
 };
 use crate::store::{Backing, BrickFile, BrickWriter, Resources, Scratch};
-use crate::verify::{Outward, Proof, ProofOptions, prove};
+use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
 
 /// The grid of the tests: 2 x 2 x 2 bricks.
 const DEPTH: u32 = 6;
@@ -159,9 +159,12 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
     let mut kept = Kept::default();
     write_surface(&cells, &domain, &options, &mut kept, &mut stats, &resources)
         .expect("sound bricks");
-    let mut source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
+    let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
+    let mut open = || -> Result<ProvedSource<_>, std::convert::Infallible> {
+        Ok(Box::new(source.clone()))
+    };
     let proof_options = ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked };
-    let proof = prove(&mut source, &scratch, &proof_options, &Void).expect("room");
+    let proof = prove(&mut open, &scratch, &proof_options, &Void).expect("room");
     Contoured { kept, proof, stats }
 }
 

@@ -8,7 +8,7 @@ use brickmend::mesh::TriangleBatch;
 use brickmend::monitor::Void;
 use brickmend::sign::FillRule;
 use brickmend::store::Scratch;
-use brickmend::verify::{Outward, Proof, ProofOptions, prove};
+use brickmend::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
 use glam::DVec3;
 use tempfile::TempDir;
 
@@ -33,8 +33,10 @@ impl Surface {
         };
         let options = ProofOptions { share_bytes: 16 << 20, outward };
         let read = ReadOptions { share_bytes: 16 << 20 };
-        let mut source = brickmend::io::open(path, &scratch, &read).expect("a readable file");
-        let proof = prove(&mut *source, &scratch, &options, &Void).expect("a readable file");
+        let mut open = || -> Result<ProvedSource<_>, brickmend::io::IoError> {
+            Ok(brickmend::io::open(path, &scratch, &read)?)
+        };
+        let proof = prove(&mut open, &scratch, &options, &Void).expect("a readable file");
         assert!(proof.holds(), "{:?}", proof.failures());
         let mut source = brickmend::io::open(path, &scratch, &read).expect("a readable file");
         let mut surface = Self { vertices: Vec::new(), triangles: Vec::new(), proof };
