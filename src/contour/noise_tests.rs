@@ -160,8 +160,7 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
     write_surface(&cells, &domain, &options, &mut kept, &mut stats, &resources)
         .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
-    let mut open =
-        || -> Result<ProvedSource<_>, std::convert::Infallible> { Ok(Box::new(source.clone())) };
+    let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };
     let proof_options = ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked };
     let proof = prove(&mut open, &scratch, &proof_options, &Void).expect("room");
     Contoured { kept, proof, stats }
