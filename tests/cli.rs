@@ -196,6 +196,22 @@ fn quiet_says_nothing_and_the_default_says_one_line() {
 }
 
 #[test]
+fn an_output_that_is_the_input_is_refused_under_any_name() {
+    let folder = folder();
+    let input = folder.path().join("cube.stl");
+    std::fs::copy(model(CUBE), &input).expect("a copy");
+    let link = folder.path().join("link.stl");
+    std::os::unix::fs::symlink(&input, &link).expect("a link");
+    let before = std::fs::read(&input).expect("the copy");
+    for output in [&input, &link] {
+        let (code, _, message) = repair(&input, output, &["--depth", "5"]);
+        assert_eq!(code, 2, "{message}");
+        assert!(message.contains("is the input itself"), "{message}");
+    }
+    assert_eq!(std::fs::read(&input).expect("the copy"), before);
+}
+
+#[test]
 fn the_input_is_never_touched() {
     let folder = folder();
     let input = folder.path().join("cube.stl");

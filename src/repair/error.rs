@@ -41,6 +41,12 @@ pub enum RepairError {
         /// The least that would do, with one thread.
         needed_bytes: u64,
     },
+    /// The output would replace the input.
+    #[error("The output {path} is the input itself, which is never touched; give another name")]
+    OutputIsInput {
+        /// The file.
+        path: PathBuf,
+    },
     /// A length with a unit for a file without one.
     #[error("{path} states no unit, so a length in metres means nothing; give model units or %")]
     NoUnit {
@@ -136,9 +142,10 @@ impl RepairError {
             Self::Input(IoError::Store(error)) => blame_store(error),
             Self::Input(_) | Self::Output(_) => Blame::Disk,
             Self::NoTriangle { .. } | Self::Broken { .. } => Blame::Input,
-            Self::BudgetBelowFloor { .. } | Self::NoUnit { .. } | Self::OutputTooCoarse { .. } => {
-                Blame::Usage
-            }
+            Self::BudgetBelowFloor { .. }
+            | Self::OutputIsInput { .. }
+            | Self::NoUnit { .. }
+            | Self::OutputTooCoarse { .. } => Blame::Usage,
             Self::EmptyResult { .. } => Blame::Model,
             Self::Locked { .. } => Blame::Lock,
             Self::Store(error)

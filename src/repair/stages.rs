@@ -1,5 +1,6 @@
 //! The stages of a repair, one after the other.
 
+use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
 use rayon::ThreadPool;
@@ -38,6 +39,7 @@ pub fn repair(
 ) -> Result<Outcome, RepairError> {
     let plan = MemoryPlan::within(limits)?;
     crate::io::detect(input).map_err(RepairError::Input)?;
+    keep_input(input, output)?;
     let pool = start_threads(plan.threads)?;
     let recording = Recording::new(monitor);
     let mut workspace =
@@ -55,6 +57,17 @@ pub fn repair(
             }
             Err(error)
         }
+    }
+}
+
+/// Refuses an output that is the input under any name: the rename at the end would replace it.
+fn keep_input(input: &Path, output: &Path) -> Result<(), RepairError> {
+    let identity = |path| std::fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
+    match (identity(input), identity(output)) {
+        (Some(a), Some(b)) if a == b => {
+            Err(RepairError::OutputIsInput { path: output.to_path_buf() })
+        }
+        _ => Ok(()),
     }
 }
 
