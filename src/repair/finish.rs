@@ -130,6 +130,13 @@ fn reasons(
             "{share:.0} % of the volume was filled because nothing from outside reaches it"
         ));
     }
+    let nesting = proof.inward_components + proof.undecided_components;
+    if nesting > 0 {
+        reasons.push(format!(
+            "{nesting} components cross others within a cell, so nesting does not tell whether \
+             they face the right way"
+        ));
+    }
     if let Some(dense) = findings.measure.dense_box {
         reasons.push(format!(
             "99.9 % of the area lies in {:?} to {:?}; far parts make the grid coarse for it",

@@ -7,6 +7,7 @@ use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
 use crate::contour::{ContourOptions, ContourStats, place_vertices, write_surface};
+use crate::defect::DefectKind;
 use crate::ingest::{
     Bins, DropRecord, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup, settle,
 };
@@ -23,7 +24,7 @@ use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, SignStats, assign_signs};
 use crate::store::{Accountant, Backing, BrickFile, Resources, SpoolReader, StoreError};
-use crate::verify::{Outward, Proof, ProofOptions, prove};
+use crate::verify::{Failure, Outward, Proof, ProofOptions, prove};
 
 /// Repairs `input` into `output`, whose format is told by its extension (PLY when it has none).
 ///
@@ -319,10 +320,14 @@ impl Run<'_> {
         let proof_options = ProofOptions { share_bytes: resources.share_bytes / 2, outward };
         let proof = prove(&mut open, resources.scratch, &proof_options, &self.recording)
             .map_err(RepairError::from_verify)?;
-        if proof.holds() {
+        // Cavities face inward, and where two components share a cell they may cross: then nesting
+        // does not tell which way one should face. That is for a person, see the reasons.
+        let nested = self.settings.fill_rule == FillRule::Evenodd;
+        let failures = proof.failures();
+        if failures.iter().all(|failure| nested && is_about_nesting(failure)) {
             return Ok(proof);
         }
-        let failures: Vec<String> = proof.failures().iter().map(ToString::to_string).collect();
+        let failures: Vec<String> = failures.iter().map(ToString::to_string).collect();
         Err(RepairError::ProofFailed {
             failures: failures.join("; "),
             folder: workspace.folder().to_path_buf(),
@@ -335,6 +340,14 @@ impl Run<'_> {
         self.recording.count(Counter::ScratchBytesWritten, scratch.written_bytes());
         self.recording.count(Counter::SpilledRuns, scratch.spilled_runs());
     }
+}
+
+/// Whether a failure is about which way a component faces, and nothing else.
+pub fn is_about_nesting(failure: &Failure) -> bool {
+    matches!(
+        failure,
+        Failure::Defects(DefectKind::InwardComponent, _) | Failure::UndecidedComponents(_)
+    )
 }
 
 fn to_json(findings: &Findings) -> String {
