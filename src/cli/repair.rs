@@ -170,7 +170,7 @@ fn finish(arguments: &RepairArguments, outcome: &mut Outcome, chatter: &Chatter)
     }
     outcome.memory.peak_bytes = peak_resident_bytes();
     if arguments.json {
-        let text = serde_json::to_string_pretty(outcome).unwrap_or_default();
+        let text = serde_json::to_string_pretty(outcome).expect("plain records serialise");
         // A reader that went away is no failure of the repair.
         let _ = writeln!(std::io::stdout(), "{text}");
     } else {

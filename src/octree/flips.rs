@@ -4,9 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::octree::edge_bits::{SIDE, edge_index, edge_position};
 use crate::octree::key::BrickKey;
-use crate::store::{
-    Record, Resources, Sorted, Sorter, Spool, SpoolReader, SpoolWriter, StoreError,
-};
+use crate::store::{Record, Resources, Sorted, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError};
 
 /// Spool of the flips.
 pub const FLIPS: &str = "flips.spool";
@@ -105,8 +103,7 @@ impl Flips {
     /// Reads the flips brick by brick.
     #[must_use]
     pub fn by_brick(&self) -> FlipReader<'_> {
-        let reader = self.spool.reader(0, self.spool.len());
-        FlipReader { reader, block: Vec::new(), at: 0 }
+        FlipReader { flips: SpoolPeek::new(&self.spool) }
     }
 
     /// Whether nothing was flipped.
@@ -141,9 +138,7 @@ fn sorted_group(
 
 /// Flips by ascending brick.
 pub struct FlipReader<'f> {
-    reader: SpoolReader<'f, FlipRecord>,
-    block: Vec<FlipRecord>,
-    at: usize,
+    flips: SpoolPeek<'f, FlipRecord>,
 }
 
 impl FlipReader<'_> {
@@ -152,26 +147,14 @@ impl FlipReader<'_> {
     /// # Errors
     /// The scratch disk fails.
     pub fn peek_brick(&mut self) -> Result<Option<u64>, StoreError> {
-        if self.at == self.block.len() {
-            self.block.clear();
-            self.at = 0;
-            if let Some(block) = self.reader.next_block()? {
-                self.block.extend_from_slice(block);
-            }
-        }
-        Ok(self.block.get(self.at).map(|flip| flip.brick))
+        Ok(self.flips.peek()?.map(|flip| flip.brick))
     }
 
-    /// Takes all flips of `brick`, which is the next brick or lies before it.
+    /// Takes all flips of `brick`, which is not after the next brick.
     ///
     /// # Errors
     /// The scratch disk fails.
     pub fn take(&mut self, brick: u64) -> Result<Vec<FlipRecord>, StoreError> {
-        let mut flips = Vec::new();
-        while self.peek_brick()? == Some(brick) {
-            flips.push(self.block[self.at]);
-            self.at += 1;
-        }
-        Ok(flips)
+        self.flips.take_while(|flip| flip.brick == brick, |flip| flip)
     }
 }

@@ -67,12 +67,6 @@ impl BrickIndex {
         }
     }
 
-    /// The number of bricks.
-    #[must_use]
-    pub fn brick_count(&self) -> usize {
-        self.bricks.len()
-    }
-
     /// The number of empty nodes.
     #[must_use]
     pub fn empty_count(&self) -> usize {
@@ -120,12 +114,6 @@ impl BrickIndex {
             }
         }
         Ok(())
-    }
-
-    /// Bytes of memory that the index holds.
-    #[must_use]
-    pub fn resident_bytes(&self) -> u64 {
-        (self.bricks.capacity() * 8 + self.empties.capacity() * size_of::<EmptyNode>()) as u64
     }
 }
 

@@ -9,7 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::contour::{ContourOptions, ContourStats, place_vertices, write_surface};
 use crate::defect::DefectKind;
 use crate::ingest::{
-    Bins, DropRecord, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup, settle,
+    BinEntry, Bins, DropRecord, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup,
+    settle,
 };
 use crate::io::{CoordinateType, Format, IoError, ReadOptions};
 use crate::monitor::{Counter, Monitor, Recording, Stage};
@@ -23,7 +24,7 @@ use crate::repair::settings::{Depth, Limits, Settings};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, SignStats, assign_signs};
-use crate::store::{Accountant, Backing, BrickFile, Resources, SpoolReader, StoreError};
+use crate::store::{Accountant, Backing, BrickFile, Resources, SpoolPeek, StoreError};
 use crate::verify::{Failure, Outward, Proof, ProofOptions, prove};
 
 /// Repairs `input` into `output`, whose format is told by its extension (PLY when it has none).
@@ -90,7 +91,8 @@ fn run_key(input: &Path, settings: &Settings) -> Result<[u8; 32], RepairError> {
     let mut hasher = read().map_err(|source| {
         RepairError::Input(IoError::Input { doing: "read", path: input.to_path_buf(), source })
     })?;
-    hasher.update(serde_json::to_string(settings).unwrap_or_default().as_bytes());
+    let settings = serde_json::to_string(settings).expect("plain records serialise");
+    hasher.update(settings.as_bytes());
     hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
     hasher.update(&crate::store::FORMAT_VERSION.to_le_bytes());
     Ok(*hasher.finalize().as_bytes())
@@ -351,53 +353,23 @@ pub fn is_about_nesting(failure: &Failure) -> bool {
 }
 
 fn to_json(findings: &Findings) -> String {
-    serde_json::to_string(findings).unwrap_or_default()
+    serde_json::to_string(findings).expect("plain records serialise")
 }
 
 /// Walks bins and drops side by side.
 struct ScanItems<'b> {
-    bins: &'b Bins,
-    next: u64,
-    drops: SpoolReader<'b, DropRecord>,
-    block: Vec<DropRecord>,
-    at: usize,
+    bins: SpoolPeek<'b, BinEntry>,
+    drops: SpoolPeek<'b, DropRecord>,
 }
 
 impl<'b> ScanItems<'b> {
     fn new(bins: &'b Bins, settled: &'b Settled) -> Self {
-        let drops = settled.drops.reader(0, settled.drops.len());
-        Self { bins, next: 0, drops, block: Vec::new(), at: 0 }
+        Self { bins: SpoolPeek::new(&bins.entries), drops: SpoolPeek::new(&settled.drops) }
     }
 
     fn next(&mut self) -> Result<Option<ScanItem>, StoreError> {
-        let mut entries = Vec::new();
-        self.bins.entries.read(self.next, 1, &mut entries)?;
-        let Some(entry) = entries.first() else { return Ok(None) };
-        self.next += 1;
-        let mut drops = Vec::new();
-        while let Some(drop) = self.peek()? {
-            if drop.brick != entry.brick {
-                break;
-            }
-            drops.push(drop.source);
-            self.at += 1;
-        }
-        Ok(Some(ScanItem {
-            brick: BrickKey(entry.brick),
-            first: entry.first,
-            count: entry.count,
-            drops,
-        }))
-    }
-
-    fn peek(&mut self) -> Result<Option<DropRecord>, StoreError> {
-        if self.at == self.block.len() {
-            self.block.clear();
-            self.at = 0;
-            if let Some(block) = self.drops.next_block()? {
-                self.block.extend_from_slice(block);
-            }
-        }
-        Ok(self.block.get(self.at).copied())
+        let Some(BinEntry { brick, first, count }) = self.bins.next()? else { return Ok(None) };
+        let drops = self.drops.take_while(|drop| drop.brick == brick, |drop| drop.source)?;
+        Ok(Some(ScanItem { brick: BrickKey(brick), first, count, drops }))
     }
 }

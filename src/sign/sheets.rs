@@ -17,7 +17,7 @@ use crate::sign::SignError;
 use crate::sign::graph::{Exterior, GraphBrick};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::store::{
-    BrickFile, Record, Resources, Sorter, Spool, SpoolReader, SpoolWriter, StoreError, ordered,
+    BrickFile, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError, ordered,
 };
 
 /// A corner of a brick that is inside because a sheet passes in front of it. 16 bytes.
@@ -141,38 +141,23 @@ impl Sheets {
 
     /// Reads the corners brick by brick.
     pub fn by_brick(&self) -> SheetReader<'_> {
-        let reader = self.spool.reader(0, self.spool.len());
-        SheetReader { reader, block: Vec::new(), at: 0 }
+        SheetReader { corners: SpoolPeek::new(&self.spool) }
     }
 }
 
 /// Corners by ascending brick.
 pub struct SheetReader<'s> {
-    reader: SpoolReader<'s, SheetCorner>,
-    block: Vec<SheetCorner>,
-    at: usize,
+    corners: SpoolPeek<'s, SheetCorner>,
 }
 
 impl SheetReader<'_> {
     /// The brick of the next corner.
     pub fn peek_brick(&mut self) -> Result<Option<u64>, StoreError> {
-        if self.at == self.block.len() {
-            self.block.clear();
-            self.at = 0;
-            if let Some(block) = self.reader.next_block()? {
-                self.block.extend_from_slice(block);
-            }
-        }
-        Ok(self.block.get(self.at).map(|corner| corner.brick))
+        Ok(self.corners.peek()?.map(|corner| corner.brick))
     }
 
     /// Takes all corners of `brick`, which is not after the next brick.
     pub fn take(&mut self, brick: u64) -> Result<Vec<u32>, StoreError> {
-        let mut corners = Vec::new();
-        while self.peek_brick()? == Some(brick) {
-            corners.push(self.block[self.at].corner);
-            self.at += 1;
-        }
-        Ok(corners)
+        self.corners.take_while(|corner| corner.brick == brick, |corner| corner.corner)
     }
 }

@@ -24,7 +24,7 @@ pub use pipeline::ordered;
 pub use resources::Resources;
 pub use scratch::{Scratch, sync_folder};
 pub use sort::{Record, Sorted, Sorter};
-pub use spool::{Spool, SpoolReader, SpoolWriter};
+pub use spool::{Spool, SpoolPeek, SpoolReader, SpoolWriter};
 pub use table::Table;
 pub use unite::{Labels, Unite};
 

@@ -16,7 +16,6 @@ const BLOCK_BYTES: usize = 128 << 10;
 /// Appends records to a spool.
 pub struct SpoolWriter<R: Pod> {
     scratch: Scratch,
-    name: String,
     file: File,
     block: Vec<R>,
     len: u64,
@@ -33,7 +32,7 @@ impl<R: Pod> SpoolWriter<R> {
             OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&path);
         let file = opened.map_err(|e| StoreError::io("create", &path, e))?;
         let block = Vec::with_capacity(BLOCK_BYTES / size_of::<R>());
-        Ok(Self { scratch: scratch.clone(), name: name.to_owned(), file, block, len: 0 })
+        Ok(Self { scratch: scratch.clone(), file, block, len: 0 })
     }
 
     /// Appends a record.
@@ -80,12 +79,6 @@ impl<R: Pod> SpoolWriter<R> {
         header[16..24].copy_from_slice(&self.len.to_le_bytes());
         self.scratch.write_at(&self.file, &header, 0)?;
         Ok(Spool { scratch: self.scratch, file: self.file, len: self.len, records: PhantomData })
-    }
-
-    /// The spool's name.
-    #[must_use]
-    pub fn name(&self) -> &str {
-        &self.name
     }
 }
 
@@ -182,6 +175,62 @@ impl<R: Pod> SpoolReader<'_, R> {
     }
 }
 
+/// Reads a range of a spool record by record, with a look at the next one.
+pub struct SpoolPeek<'s, R: Pod> {
+    reader: SpoolReader<'s, R>,
+    at: usize,
+}
+
+impl<'s, R: Pod> SpoolPeek<'s, R> {
+    /// All of `spool`, from its first record.
+    #[must_use]
+    pub fn new(spool: &'s Spool<R>) -> Self {
+        Self { reader: spool.reader(0, spool.len()), at: 0 }
+    }
+
+    /// The next record, `None` at the end.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub fn peek(&mut self) -> Result<Option<R>, StoreError> {
+        if self.at == self.reader.block.len() {
+            self.at = 0;
+            if self.reader.next_block()?.is_none() {
+                self.reader.block.clear();
+            }
+        }
+        Ok(self.reader.block.get(self.at).copied())
+    }
+
+    /// Takes the next record, `None` at the end.
+    ///
+    /// # Errors
+    /// The disk fails.
+    #[expect(clippy::should_implement_trait, reason = "an iterator could not fail in the open")]
+    pub fn next(&mut self) -> Result<Option<R>, StoreError> {
+        let record = self.peek()?;
+        self.at += usize::from(record.is_some());
+        Ok(record)
+    }
+
+    /// Takes the records that come next and satisfy `belongs`, as `value` of each.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub fn take_while<V>(
+        &mut self,
+        belongs: impl Fn(&R) -> bool,
+        value: impl Fn(R) -> V,
+    ) -> Result<Vec<V>, StoreError> {
+        let mut taken = Vec::new();
+        while let Some(record) = self.peek()?.filter(&belongs) {
+            taken.push(value(record));
+            self.at += 1;
+        }
+        Ok(taken)
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -206,5 +255,24 @@ mod tests {
         }
         assert_eq!(expected, 29_000);
         assert!(Spool::<[u32; 4]>::open(&scratch, "spool").is_err());
+    }
+
+    #[test]
+    fn groups_are_taken_whole_across_blocks() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let mut writer = SpoolWriter::<[u32; 2]>::create(&scratch, "groups").expect("create works");
+        for i in 0..40_000 {
+            writer.push([i / 7000, i]).expect("push works");
+        }
+        let spool = writer.finish().expect("finish works");
+        let mut peek = SpoolPeek::new(&spool);
+        let mut next = 0;
+        while let Some([group, _]) = peek.peek().expect("read works") {
+            let taken = peek.take_while(|r| r[0] == group, |r| r[1]).expect("read works");
+            assert!(taken.iter().copied().eq(next..next + taken.len() as u32));
+            next += taken.len() as u32;
+        }
+        assert_eq!(next, 40_000);
     }
 }
