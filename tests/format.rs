@@ -120,7 +120,7 @@ fn records_of_spools_are_as_documented() {
 #[test]
 fn directory_entries_are_as_documented() {
     check_record::<DirectoryEntry>(
-        "Directory",
+        "Entry",
         &[
             offset_of!(DirectoryEntry, key),
             offset_of!(DirectoryEntry, offset),
@@ -130,7 +130,7 @@ fn directory_entries_are_as_documented() {
         ],
     );
     assert_eq!(HAS_ODD_FACES, 1);
-    says("Directory", "in hits.bricks bit 0: the brick sees an odd face");
+    says("Entry", "in hits.bricks bit 0: the brick sees an odd face");
 }
 
 fn scratch() -> (tempfile::TempDir, Scratch) {
@@ -155,18 +155,22 @@ fn a_spool_lies_on_disk_as_documented() {
     let triangle = SoupTriangle { corners, source: 11, part: 12, material: TRANSPARENT, tags: 0 };
     writer.push(triangle).expect("writable");
     writer.push(SoupTriangle { source: 13, ..triangle }).expect("writable");
-    writer.finish().expect("writable");
+    let spool = writer.finish().expect("writable");
     let bytes = std::fs::read(scratch.path("soup.spool")).expect("readable");
     let map = byte_map("Spool");
-    assert_eq!(map, [(0, 8), (8, 4), (12, 4), (16, 8), (24, 40)]);
+    assert_eq!(map, [(0, 8), (8, 4), (12, 4), (16, 8), (24, 16), (40, 24)]);
     says("Spool", "\"BRMDSPOL\"");
+    says("Spool", "131072 / record size records");
     says("Spool", "    64        records");
     assert_eq!(&bytes[..8], b"BRMDSPOL");
     assert_eq!(u32_at(&bytes, 8), FORMAT_VERSION);
     assert_eq!(u32_at(&bytes, 12), 88);
     assert_eq!(u64_at(&bytes, 16), 2);
-    assert!(bytes[24..64].iter().all(|&byte| byte == 0));
-    assert_eq!(bytes.len(), 64 + 2 * 88);
+    let digests = &bytes[64 + 2 * 88..];
+    assert_eq!(digests, &blake3_of(&bytes[64..64 + 2 * 88])[..16], "one block");
+    assert_eq!(bytes[24..40], blake3_of(digests)[..16]);
+    assert_eq!(spool.state().root, bytes[24..40]);
+    assert!(bytes[40..64].iter().all(|&byte| byte == 0));
     assert_eq!(bytes[64 + 64..64 + 72], 9.5_f64.to_le_bytes(), "the last coordinate");
     assert_eq!(u32_at(&bytes, 64 + 72), 11);
     assert_eq!(u32_at(&bytes, 64 + 76), 12);
@@ -208,12 +212,19 @@ fn a_brick_file_lies_on_disk_as_documented() {
     assert_eq!(offsets[3] as usize, WINDOW + (WINDOW + 5).next_multiple_of(16));
     assert_eq!(bytes.len() % WINDOW, 0, "whole windows");
     let directory = std::fs::read(scratch.path("a.directory")).expect("readable");
+    let header = &directory[..64];
+    assert_eq!(byte_map("Directory, 40"), [(0, 8), (8, 4), (12, 4), (16, 48)]);
+    assert_eq!(&header[..8], b"BRMDDIRY");
+    says("Directory, 40", "\"BRMDDIRY\"");
+    assert_eq!((u32_at(header, 8), u32_at(header, 12)), (FORMAT_VERSION, 40));
+    let directory = &directory[64..];
     assert_eq!(directory.len(), 4 * 40);
+    assert_eq!(file.state().expect("on disk").root, blake3_of(directory)[..16]);
     let second = &directory[40..80];
     assert_eq!(u64_at(second, 0), 5);
     assert_eq!(u64_at(second, 8), 80);
     assert_eq!(u32_at(second, 16), 33);
-    assert_eq!(u32_at(&directory, 20), 7);
+    assert_eq!(u32_at(directory, 20), 7);
     assert_eq!(second[24..40], blake3_of(&[2; 33])[..16]);
 }
 
@@ -226,8 +237,8 @@ fn blake3_of(bytes: &[u8]) -> [u8; 32] {
 fn a_manifest_lies_on_disk_as_documented() {
     let (_folder, scratch) = scratch();
     let path = scratch.path("manifest");
-    let stages = vec!["ingest".to_owned()];
-    let manifest = Manifest { key: [9; 32], stages, ..Manifest::default() };
+    let steps = vec!["read".to_owned()];
+    let manifest = Manifest { key: [9; 32], steps, ..Manifest::default() };
     save_manifest(&path, &manifest).expect("writable");
     let bytes = std::fs::read(&path).expect("readable");
     assert_eq!(byte_map("Manifest"), [(0, 8), (8, 4), (12, 4), (16, 32)]);

@@ -18,10 +18,16 @@ pub enum Exit {
     Unusable = 5,
     /// Another run holds the work folder.
     Locked = 6,
+    /// Stopped by a limit; the same command goes on.
+    Stopped = 7,
     /// The input cannot be read.
     Input = 65,
+    /// The same command may well work the next time.
+    Temporary = 75,
     /// Interrupted.
     Interrupted = 130,
+    /// Asked to end.
+    Terminated = 143,
 }
 
 impl From<Exit> for ExitCode {
@@ -39,7 +45,9 @@ impl From<&RepairError> for Exit {
             Blame::Disk => Self::Unusable,
             Blame::Lock => Self::Locked,
             Blame::Input => Self::Input,
+            Blame::Temporary => Self::Temporary,
             Blame::Interrupted => Self::Interrupted,
+            Blame::Limit => Self::Stopped,
         }
     }
 }
@@ -49,9 +57,12 @@ pub const EXIT_STATUS: &str = "\
 Exit status:
   0    done (the outcome may still ask for a look)
   1    internal error, also a failed proof: nothing is put in place
-  2    usage, also a memory budget below the floor
+  2    usage, also a memory budget below the floor or a disk limit below the estimate
   4    the result has no triangle
-  5    output or scratch folder unusable
+  5    output or scratch folder unusable, also a full disk: run again to go on
   6    another run holds the work folder
+  7    stopped by --max-disk on the way: run again with more to go on
   65   the input cannot be read, or has no triangle
-  130  interrupted";
+  75   the system had no memory left, or the input changed: run again to go on
+  130  interrupted (SIGINT), state saved: run again to go on
+  143  asked to end (SIGTERM), state saved: run again to go on";

@@ -1,9 +1,12 @@
 //! The command line: arguments to settings, events to the terminal, errors to exit codes.
 
+mod allocator;
 mod exit_code;
+mod last_words;
 mod memory;
 mod progress;
 mod repair;
+mod signals;
 
 use clap::{Parser, Subcommand};
 

@@ -12,6 +12,7 @@ use brickmend::repair::StageReport;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
 use crate::cli::memory::cpu_seconds;
+use crate::cli::signals::Stop;
 
 /// Off a terminal, progress is told this often.
 const LINE_INTERVAL: Duration = Duration::from_secs(60);
@@ -63,6 +64,7 @@ fn write_line(text: &str) {
 /// A monitor that draws on the terminal.
 pub struct Progress {
     chatter: Chatter,
+    stop: Stop,
     state: Mutex<State>,
 }
 
@@ -76,7 +78,7 @@ struct State {
 }
 
 impl Progress {
-    pub fn new(chatter: Chatter) -> Self {
+    pub fn new(chatter: Chatter, stop: Stop) -> Self {
         let target =
             if chatter.bars { ProgressDrawTarget::stderr() } else { ProgressDrawTarget::hidden() };
         let bar = ProgressBar::with_draw_target(Some(0), target);
@@ -90,7 +92,7 @@ impl Progress {
             done: 0,
             last_line: Instant::now(),
         };
-        Self { chatter, state: Mutex::new(state) }
+        Self { chatter, stop, state: Mutex::new(state) }
     }
 
     /// Seconds of every stage so far.
@@ -137,14 +139,29 @@ impl Monitor for Progress {
         let mut state = self.state();
         if let Some((_, start, cpu)) = state.stage.take() {
             let seconds = start.elapsed().as_secs_f64();
-            let report = StageReport { seconds, cpu_seconds: cpu_seconds() - cpu };
-            state.seconds.insert(stage, report);
+            let report = state.seconds.entry(stage).or_default();
+            report.seconds += seconds;
+            report.cpu_seconds += cpu_seconds() - cpu;
             self.chatter.detail(&format!("{}: {seconds:.3} s", stage.name()));
         }
+    }
+
+    fn checkpoint(&self, step: &str, items: u64) {
+        let state = self.state();
+        let text = if items == 0 {
+            format!("checkpoint: {step}")
+        } else {
+            format!("checkpoint: {step}, {items} done")
+        };
+        state.bar.suspend(|| self.chatter.detail(&text));
     }
 
     fn note(&self, text: &str) {
         let state = self.state();
         state.bar.suspend(|| self.chatter.detail(text));
+    }
+
+    fn cancelled(&self) -> bool {
+        self.stop.is_asked()
     }
 }

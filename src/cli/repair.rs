@@ -16,6 +16,7 @@ use clap::{Args, ValueEnum};
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
 use crate::cli::memory::peak_resident_bytes;
 use crate::cli::progress::{Chatter, Progress};
+use crate::cli::signals::Stop;
 
 /// Arguments of `brickmend repair`.
 #[derive(Debug, Args)]
@@ -54,9 +55,16 @@ pub struct RepairArguments {
     /// Worker threads [default: one per processor].
     #[arg(short = 'j', long, value_name = "N", help_heading = "Resources")]
     threads: Option<usize>,
+    /// Most that scratch files and the output may take of the disk, such as 20GB [default: no
+    /// limit].
+    #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Resources")]
+    max_disk: Option<u64>,
     /// Folder for scratch files [default: beside the output].
     #[arg(long, value_name = "DIR", help_heading = "Resources")]
     work_dir: Option<PathBuf>,
+    /// Start anew, whatever an earlier run of the same work left.
+    #[arg(long, help_heading = "Resources")]
+    fresh: bool,
     /// Print the outcome as JSON on stdout; see docs/outcome.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
@@ -126,7 +134,9 @@ impl RepairArguments {
         Limits {
             max_memory_bytes: self.max_memory,
             threads: self.threads.unwrap_or(processors),
+            max_disk_bytes: self.max_disk,
             work_dir: self.work_dir.clone(),
+            fresh: self.fresh,
             ..Limits::default()
         }
     }
@@ -139,7 +149,14 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         chatter.error(&Refused(format!("{path}: the extension names no format that is written")));
         return Exit::Usage.into();
     };
-    let progress = Progress::new(*chatter);
+    let stop = match Stop::listen() {
+        Ok(stop) => stop,
+        Err(error) => {
+            chatter.error(&error);
+            return Exit::Internal.into();
+        }
+    };
+    let progress = Progress::new(*chatter, stop.clone());
     let settings = arguments.settings();
     let limits = arguments.limits();
     let (input, output) = (&arguments.input, &arguments.output);
@@ -150,13 +167,16 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
             outcome.stages = progress.stages();
             finish(arguments, &mut outcome, chatter)
         }
-        Err(error) => fail(&error, chatter),
+        Err(error) => fail(&error, &stop, chatter),
     }
 }
 
-fn fail(error: &RepairError, chatter: &Chatter) -> ExitCode {
+fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
     chatter.error(error);
-    Exit::from(error).into()
+    match Exit::from(error) {
+        Exit::Interrupted => stop.exit().into(),
+        exit => exit.into(),
+    }
 }
 
 /// Tells the outcome, draws the preview.

@@ -24,7 +24,7 @@ use serde::{Deserialize, Serialize};
 use crate::octree::{BrickError, Domain};
 use crate::store::{BrickFile, Resources, StoreError};
 
-pub use write::{WriteError, write_surface};
+pub use write::{WriteError, WriteProgress, write_surface};
 
 /// Name of the brick file that [`place_vertices`] leaves.
 pub const CELLS: &str = "cells.bricks";
@@ -67,6 +67,14 @@ pub enum ContourError {
     },
 }
 
+impl ContourError {
+    /// Whether the work so far is worth keeping.
+    #[must_use]
+    pub fn is_stop(&self) -> bool {
+        matches!(self, Self::Store(error) if error.is_stop())
+    }
+}
+
 /// Counts of contouring.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ContourStats {
@@ -88,6 +96,19 @@ pub struct ContourStats {
     pub triangles: u64,
     /// Vertices written.
     pub vertices: u64,
+}
+
+impl ContourStats {
+    /// Adds the counts of a brick; what the written file has in all is not added.
+    fn add(&mut self, other: &Self) {
+        self.cells += other.cells;
+        self.multi_cells += other.multi_cells;
+        self.flipped_faces += other.flipped_faces;
+        self.cell_vertices += other.cell_vertices;
+        self.clamped_vertices += other.clamped_vertices;
+        self.polygons += other.polygons;
+        self.fans += other.fans;
+    }
 }
 
 /// Places the vertices of all bricks.

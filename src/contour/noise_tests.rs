@@ -10,13 +10,13 @@ use glam::DVec3;
 use crate::contour::mdc::table::{FLIPPED, TABLE};
 use crate::contour::{ContourOptions, ContourStats, Method, place_vertices, write_surface};
 use crate::mesh::shapes::{ListedTriangles, Random};
-use crate::mesh::{MeshSink, SinkStats};
+use crate::mesh::{MeshSink, SinkState, SinkStats};
 use crate::monitor::Void;
 use crate::octree::{
     BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SnapBox,
     SourcePlane, decode_cells, edge_position, encode,
 };
-use crate::store::{Backing, BrickFile, BrickWriter, Resources, Scratch};
+use crate::store::{Backing, BrickFile, BrickWriter, NoCheckpoints, Resources, Scratch};
 use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
 
 /// The grid of the tests: 2 x 2 x 2 bricks.
@@ -47,6 +47,14 @@ impl MeshSink for Kept {
         assert_eq!(indices.len(), corners.len());
         self.triangles.extend_from_slice(indices);
         Ok(())
+    }
+
+    fn bytes_so_far(&self) -> u64 {
+        0
+    }
+
+    fn checkpoint(&mut self) -> Result<SinkState, Infallible> {
+        Ok(SinkState::default())
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, Infallible> {
@@ -142,6 +150,7 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
         share_bytes: 8 << 20,
         cached_windows: 2,
         backing,
+        checkpoints: &NoCheckpoints,
         monitor: &Void,
     };
     let unit = SnapBox { lo: [0.0; 3], hi: [1.0; 3] };
@@ -153,11 +162,11 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
     }
     let signs = writer.finish(2).expect("room");
     let options = ContourOptions { method: Method::Mdc, crease_deg: 12.0 };
-    let (cells, mut stats) =
+    let (cells, placed) =
         place_vertices(&signs, &domain, &options, &resources).expect("sound bricks");
     assert_vertices_lie_in_their_cells(&cells, &domain);
     let mut kept = Kept::default();
-    write_surface(&cells, &domain, &options, &mut kept, &mut stats, &resources)
+    let stats = write_surface(&cells, &domain, &options, (&placed, None), &mut kept, &resources)
         .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
     let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };

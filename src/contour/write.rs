@@ -1,11 +1,18 @@
 //! Writes the surface: all vertices, then the triangles of brick after brick.
+//!
+//! In:         cells of all bricks, and a sink.
+//! Out:        the sink has taken everything.
+//! Invariant:  what the sink takes does not depend on where an earlier run was stopped.
+//! Memory:     4 bytes a brick, and what [`Polygons`] holds.
 
-use crate::contour::mdc::{BrickTriangles, Polygons};
+use serde::{Deserialize, Serialize};
+
+use crate::contour::mdc::{BrickTriangles, FAN_POINT, Polygons};
 use crate::contour::{ContourError, ContourOptions, ContourStats, Method};
-use crate::mesh::MeshSink;
+use crate::mesh::{MeshSink, SinkState};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, decode_cells};
-use crate::store::{BrickFile, Resources, StoreError, ordered};
+use crate::store::{BrickFile, Progress, Resources, StoreError, ordered};
 
 /// What can go wrong while the surface is written.
 #[derive(Debug, thiserror::Error)]
@@ -25,7 +32,28 @@ impl<E: std::error::Error> From<StoreError> for WriteError<E> {
     }
 }
 
-/// Writes what the vertices in `cells` span into `sink`, and adds to `stats`.
+/// How far the surface is written.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct WriteProgress {
+    /// Bricks whose vertices are written, and behind those of all, bricks whose triangles are.
+    pub items: u64,
+    /// Counts so far, with those of placing the vertices.
+    pub stats: ContourStats,
+    /// Where the sink goes on.
+    pub sink: SinkState,
+}
+
+impl WriteProgress {
+    /// What an earlier run noted.
+    #[must_use]
+    pub fn noted(resources: &Resources) -> Option<Self> {
+        let progress = resources.checkpoints.start()?;
+        serde_json::from_str(&progress.counts).ok()
+    }
+}
+
+/// Writes what the vertices in `cells` span into `sink`. `placed` are the counts of placing them;
+/// `start` is where the sink was, if it goes on.
 ///
 /// # Errors
 /// [`WriteError`].
@@ -33,92 +61,151 @@ pub fn write_surface<S: MeshSink + ?Sized>(
     cells: &BrickFile,
     domain: &Domain,
     options: &ContourOptions,
+    (placed, start): (&ContourStats, Option<WriteProgress>),
     sink: &mut S,
-    stats: &mut ContourStats,
     resources: &Resources,
-) -> Result<(), WriteError<S::Error>>
+) -> Result<ContourStats, WriteError<S::Error>>
 where
     S::Error: Send,
 {
     let Method::Mdc = options.method;
-    let bases = write_vertices(cells, domain, sink, resources)?;
-    stats.vertices = u64::from(*bases.last().unwrap_or(&0));
-    write_triangles(cells, domain, &bases, sink, stats, resources)
+    let bases = number_vertices(cells)?;
+    let vertices = u64::from(*bases.last().unwrap_or(&0));
+    let (items, stats) = match start {
+        Some(start) => (start.items, start.stats),
+        None => (0, ContourStats { vertices, ..*placed }),
+    };
+    let saved_bytes = sink.bytes_so_far();
+    let mut writing = Writing { cells, domain, sink, resources, items, stats, saved_bytes };
+    resources.monitor.advance(items);
+    writing.vertices()?;
+    writing.triangles(&bases)?;
+    Ok(writing.stats)
 }
 
-/// Writes the vertices of all bricks; the number of the first of each, and their total.
-fn write_vertices<S: MeshSink + ?Sized>(
-    cells: &BrickFile,
-    domain: &Domain,
-    sink: &mut S,
-    resources: &Resources,
-) -> Result<Vec<u32>, WriteError<S::Error>> {
+/// The number of the first vertex of each brick, and their total.
+fn number_vertices(cells: &BrickFile) -> Result<Vec<u32>, StoreError> {
+    let limit = u64::from(FAN_POINT) - 1;
     let mut bases = Vec::with_capacity(cells.len() + 1);
     let mut total = 0_u64;
-    let mut positions = Vec::new();
-    for number in 0..cells.len() {
-        if resources.monitor.cancelled() {
-            return Err(StoreError::Cancelled.into());
-        }
+    for entry in cells.directory() {
         bases.push(total as u32);
-        let view = cells.view(number)?;
-        let record = decode_cells(&view).map_err(ContourError::Brick)?;
-        let brick = BrickKey(cells.directory()[number].key).position();
-        let side = domain.brick_units();
-        let base = brick.map(|c| i64::from(c) * side);
-        positions.clear();
-        positions.extend(record.positions.iter().map(|position| {
-            domain.to_model(std::array::from_fn(|a| base[a] + i64::from(position[a].to_native())))
-        }));
-        resources.monitor.gauge(Gauge::ResidentVertices, positions.len() as u64);
-        total += positions.len() as u64;
-        let limit = u64::from(crate::contour::mdc::FAN_POINT) - 1;
+        total += u64::from(entry.flags);
         if total > limit {
-            return Err(StoreError::TooMany { what: "Output vertices", limit }.into());
+            return Err(StoreError::TooMany { what: "Output vertices", limit });
         }
-        sink.vertices(&positions).map_err(WriteError::Sink)?;
     }
     bases.push(total as u32);
     Ok(bases)
 }
 
-fn write_triangles<S: MeshSink + ?Sized>(
-    cells: &BrickFile,
-    domain: &Domain,
-    bases: &[u32],
-    sink: &mut S,
-    stats: &mut ContourStats,
-    resources: &Resources,
-) -> Result<(), WriteError<S::Error>>
+/// A surface on its way into the sink.
+struct Writing<'w, S: ?Sized> {
+    cells: &'w BrickFile,
+    domain: &'w Domain,
+    sink: &'w mut S,
+    resources: &'w Resources<'w>,
+    items: u64,
+    stats: ContourStats,
+    saved_bytes: u64,
+}
+
+impl<S: MeshSink + ?Sized> Writing<'_, S>
 where
     S::Error: Send,
 {
-    let with_corners = sink.needs_corners();
-    let mut numbers = 0..cells.len();
-    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    ordered(
-        resources.pool,
-        || {
-            if resources.monitor.cancelled() {
+    /// Writes the vertices of the bricks that are left.
+    fn vertices(&mut self) -> Result<(), WriteError<S::Error>> {
+        let mut positions = Vec::new();
+        for number in (self.items as usize).min(self.cells.len())..self.cells.len() {
+            if self.resources.monitor.cancelled() {
+                self.save()?;
                 return Err(StoreError::Cancelled.into());
             }
-            Ok(numbers.next())
-        },
-        || Polygons::new(cells, bases, domain, with_corners),
-        |polygons, number| {
-            let _brick = resident.hold(1);
-            Ok(polygons.triangles(number)?)
-        },
-        |mut brick: BrickTriangles| {
-            brick.number_fan_points(stats.vertices as u32);
-            sink.vertices(&brick.fan_points).map_err(WriteError::Sink)?;
-            sink.triangles(&brick.indices, &brick.corners).map_err(WriteError::Sink)?;
-            stats.vertices += brick.fan_points.len() as u64;
-            stats.triangles += brick.indices.len() as u64;
-            stats.polygons += brick.stats.polygons;
-            stats.fans += brick.stats.fans;
-            resources.monitor.advance(1);
-            Ok(())
-        },
-    )
+            self.read_positions(number, &mut positions)?;
+            self.resources.monitor.gauge(Gauge::ResidentVertices, positions.len() as u64);
+            self.sink.vertices(&positions).map_err(WriteError::Sink)?;
+            self.item_done()?;
+        }
+        Ok(())
+    }
+
+    /// The vertices of a brick in model units.
+    fn read_positions(
+        &self,
+        number: usize,
+        positions: &mut Vec<[f64; 3]>,
+    ) -> Result<(), ContourError> {
+        let view = self.cells.view(number)?;
+        let record = decode_cells(&view)?;
+        let entry = self.cells.directory()[number];
+        let brick = BrickKey(entry.key).position();
+        if record.positions.len() != entry.flags as usize {
+            let expected = "as many vertices as the directory says";
+            return Err(ContourError::Contradiction { brick, expected });
+        }
+        let base = brick.map(|c| i64::from(c) * self.domain.brick_units());
+        positions.clear();
+        positions.extend(record.positions.iter().map(|position| {
+            let at = std::array::from_fn(|a| base[a] + i64::from(position[a].to_native()));
+            self.domain.to_model(at)
+        }));
+        Ok(())
+    }
+
+    /// Writes the triangles of the bricks that are left.
+    fn triangles(&mut self, bases: &[u32]) -> Result<(), WriteError<S::Error>> {
+        let (cells, domain, resources) = (self.cells, self.domain, self.resources);
+        let with_corners = self.sink.needs_corners();
+        let mut numbers = self.items as usize - cells.len()..cells.len();
+        let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
+        let written = ordered(
+            resources.pool,
+            || {
+                if resources.monitor.cancelled() {
+                    return Err(StoreError::Cancelled.into());
+                }
+                Ok(numbers.next())
+            },
+            || Polygons::new(cells, bases, domain, with_corners),
+            |polygons, number| {
+                let _brick = resident.hold(1);
+                Ok(polygons.triangles(number)?)
+            },
+            |brick| self.take(brick),
+        );
+        if let Err(WriteError::Contour(ContourError::Store(StoreError::Cancelled))) = written {
+            self.save()?;
+        }
+        written
+    }
+
+    fn take(&mut self, mut brick: BrickTriangles) -> Result<(), WriteError<S::Error>> {
+        brick.number_fan_points(self.stats.vertices as u32);
+        self.sink.vertices(&brick.fan_points).map_err(WriteError::Sink)?;
+        self.sink.triangles(&brick.indices, &brick.corners).map_err(WriteError::Sink)?;
+        self.stats.vertices += brick.fan_points.len() as u64;
+        self.stats.triangles += brick.indices.len() as u64;
+        self.stats.add(&brick.stats);
+        self.item_done()
+    }
+
+    fn item_done(&mut self) -> Result<(), WriteError<S::Error>> {
+        self.items += 1;
+        self.resources.monitor.advance(1);
+        let since = self.sink.bytes_so_far() - self.saved_bytes;
+        if since >= self.resources.checkpoints.interval_bytes() { self.save() } else { Ok(()) }
+    }
+
+    fn save(&mut self) -> Result<(), WriteError<S::Error>> {
+        self.saved_bytes = self.sink.bytes_so_far();
+        let sink = self.sink.checkpoint().map_err(WriteError::Sink)?;
+        let noted = WriteProgress { items: self.items, stats: self.stats, sink };
+        let counts = serde_json::to_string(&noted).expect("plain records serialise");
+        Ok(self.resources.checkpoints.save(Progress {
+            items: self.items,
+            files: Vec::new(),
+            counts,
+        })?)
+    }
 }

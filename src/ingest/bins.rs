@@ -7,7 +7,7 @@ use crate::ingest::soup::Soup;
 use crate::ingest::touch::for_each_touched_brick;
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{BinTriangle, Domain, SoupTriangle};
-use crate::store::{Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
+use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
 
 /// Spool of the binned triangles, by brick and source number.
 pub const BINS: &str = "bins.spool";
@@ -41,11 +41,17 @@ impl Bins {
     ///
     /// # Errors
     /// They are missing or damaged.
-    pub fn open(resources: &Resources) -> Result<Self, StoreError> {
+    pub fn open(resources: &Resources, files: &[FileState]) -> Result<Self, StoreError> {
         Ok(Self {
-            triangles: Spool::open(resources.scratch, BINS)?,
-            entries: Spool::open(resources.scratch, BIN_ENTRIES)?,
+            triangles: Spool::open(resources.scratch, FileState::find(files, BINS)?)?,
+            entries: Spool::open(resources.scratch, FileState::find(files, BIN_ENTRIES)?)?,
         })
+    }
+
+    /// The files, as they have to be found again.
+    #[must_use]
+    pub fn files(&self) -> Vec<FileState> {
+        vec![self.triangles.state().clone(), self.entries.state().clone()]
     }
 }
 
@@ -58,7 +64,7 @@ pub fn fill_bins(
     domain: &Domain,
     resources: &Resources,
 ) -> Result<(Bins, SoupMeasure), StoreError> {
-    let mut histogram = AreaHistogram::new(soup.bounds);
+    let mut histogram = AreaHistogram::new(soup.facts.bounds);
     let mut sorter = Sorter::<BinTriangle>::new(resources.scratch, resources.share_bytes);
     let mut next = 0;
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);

@@ -18,7 +18,7 @@ use crate::ingest::examine::{Copy3, Fact, RIM_KEEP, SAW_INTERFACE, SAW_KEEP, exa
 use crate::ingest::packed::NO_GROUP;
 use crate::octree::Domain;
 use crate::store::{
-    Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
+    FileState, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
 };
 
 /// Spool of the triangles that do not count.
@@ -71,8 +71,12 @@ impl Settled {
     ///
     /// # Errors
     /// They are missing or damaged.
-    pub fn open(resources: &Resources, stats: SettleStats) -> Result<Self, StoreError> {
-        Ok(Self { drops: Spool::open(resources.scratch, DROPS)?, stats })
+    pub fn open(
+        resources: &Resources,
+        files: &[FileState],
+        stats: SettleStats,
+    ) -> Result<Self, StoreError> {
+        Ok(Self { drops: Spool::open(resources.scratch, FileState::find(files, DROPS)?)?, stats })
     }
 }
 

@@ -20,8 +20,8 @@ mod soup;
 mod touch;
 
 pub use area::SoupMeasure;
-pub use bins::{BinEntry, Bins, fill_bins};
-pub use duplicates::{DropRecord, SettleStats, Settled, settle};
+pub use bins::{BIN_ENTRIES, BINS, BinEntry, Bins, fill_bins};
+pub use duplicates::{DROPS, DropRecord, SettleStats, Settled, settle};
 pub use error::IngestError;
-pub use soup::{AttributeRecord, Soup, SoupStats, read_soup};
+pub use soup::{ATTRIBUTES, AttributeRecord, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use touch::for_each_touched_brick;

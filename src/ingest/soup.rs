@@ -4,10 +4,10 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
-use crate::store::{Resources, Spool, SpoolWriter, StoreError};
+use crate::store::{FileState, Resources, Spool, SpoolWriter, StoreError};
 
 /// Spool of the triangles.
 pub const SOUP: &str = "soup.spool";
@@ -24,6 +24,19 @@ pub struct AttributeRecord {
     pub colours: [[u8; 4]; 3],
     /// Number of the polygon in the file.
     pub polygon: u32,
+}
+
+/// What was found out about the input while it was read.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SoupFacts {
+    /// Box of the finite triangles; empty when there is none.
+    pub bounds: SnapBox,
+    /// Parts that have triangles.
+    pub parts: u64,
+    /// Materials that have triangles.
+    pub materials: u64,
+    /// Counts.
+    pub stats: SoupStats,
 }
 
 /// Counts of the input.
@@ -43,16 +56,36 @@ pub struct SoupStats {
 pub struct Soup {
     /// Finite triangles in file order.
     pub spool: Spool<SoupTriangle>,
-    /// Their box; empty when there is none.
-    pub bounds: SnapBox,
-    /// Part names.
-    pub parts: Vec<Part>,
-    /// Materials.
-    pub materials: Vec<Material>,
-    /// Whether `attributes.spool` was written.
-    pub has_attributes: bool,
-    /// Counts.
-    pub stats: SoupStats,
+    /// Texture coordinates and colours, where the file has any.
+    pub attributes: Option<Spool<AttributeRecord>>,
+    /// What was found out.
+    pub facts: SoupFacts,
+}
+
+impl Soup {
+    /// Opens the triangles that an earlier run read.
+    ///
+    /// # Errors
+    /// They are missing or damaged.
+    pub fn open(
+        resources: &Resources,
+        files: &[FileState],
+        facts: SoupFacts,
+    ) -> Result<Self, StoreError> {
+        let attributes = files.iter().find(|file| file.name == ATTRIBUTES);
+        Ok(Self {
+            spool: Spool::open(resources.scratch, FileState::find(files, SOUP)?)?,
+            attributes: attributes.map(|f| Spool::open(resources.scratch, f)).transpose()?,
+            facts,
+        })
+    }
+
+    /// The files, as they have to be found again.
+    #[must_use]
+    pub fn files(&self) -> Vec<FileState> {
+        let attributes = self.attributes.as_ref().map(|spool| spool.state().clone());
+        std::iter::once(self.spool.state().clone()).chain(attributes).collect()
+    }
 }
 
 /// Reads `source` to its end.
@@ -92,15 +125,11 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     if strict && found > 0 {
         return Err(IngestError::Broken { found });
     }
-    let has_attributes = writer.attributes.is_some();
-    writer.attributes.map(SpoolWriter::finish).transpose()?;
+    let (parts, materials) = (source.parts().len() as u64, source.materials().len() as u64);
     Ok(Soup {
         spool: writer.spool.finish()?,
-        bounds: writer.bounds,
-        parts: source.parts().to_vec(),
-        materials: source.materials().to_vec(),
-        has_attributes,
-        stats,
+        attributes: writer.attributes.map(SpoolWriter::finish).transpose()?,
+        facts: SoupFacts { bounds: writer.bounds, parts, materials, stats },
     })
 }
 

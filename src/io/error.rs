@@ -85,17 +85,7 @@ pub enum IoError {
         /// The system's own word.
         source: std::io::Error,
     },
-    /// The operating system refused to create or write the output.
-    #[error("Cannot {doing} {path}")]
-    Output {
-        /// What was tried, as a verb.
-        doing: &'static str,
-        /// The output file.
-        path: PathBuf,
-        /// The system's own word.
-        source: std::io::Error,
-    },
-    /// The scratch folder failed.
+    /// The scratch folder or the output failed.
     #[error(transparent)]
     Store(#[from] StoreError),
 }
@@ -110,7 +100,7 @@ impl IoError {
             | Self::Unsupported { .. }
             | Self::TooMany { .. }
             | Self::Input { .. } => true,
-            Self::TooLarge { .. } | Self::Output { .. } | Self::Store(_) => false,
+            Self::TooLarge { .. } | Self::Store(_) => false,
         }
     }
 
@@ -130,10 +120,6 @@ impl IoError {
 
     pub(crate) fn input(doing: &'static str, path: &Path, source: std::io::Error) -> Self {
         Self::Input { doing, path: path.to_path_buf(), source }
-    }
-
-    pub(crate) fn output(doing: &'static str, path: &Path, source: std::io::Error) -> Self {
-        Self::Output { doing, path: path.to_path_buf(), source }
     }
 
     pub(crate) fn too_many(path: &Path, what: &'static str, limit: u64) -> Self {

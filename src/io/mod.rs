@@ -32,9 +32,10 @@ pub use crate::io::detect::{detect, format_of_extension};
 pub use crate::io::error::{IoError, Place};
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
+pub use crate::io::output::{FACES, check_output};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
-use crate::mesh::{MeshSink, MeshSource};
+use crate::mesh::{MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
 /// The most triangles in one batch.
@@ -114,9 +115,27 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
 /// The file or a scratch file cannot be created.
 pub fn create(path: &Path, format: Format, scratch: &Scratch) -> Result<Sink, IoError> {
     Ok(match format {
-        Format::Obj => Box::new(ObjWriter::create(path)?),
-        Format::Stl => Box::new(StlWriter::create(path)?),
+        Format::Obj => Box::new(ObjWriter::create(path, scratch)?),
+        Format::Stl => Box::new(StlWriter::create(path, scratch)?),
         Format::Ply => Box::new(PlyWriter::create(path, scratch)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
+    })
+}
+
+/// Goes on writing a model file where an earlier sink was when it told its `state`.
+///
+/// # Errors
+/// The files are gone, or are not what they were ([`crate::store::StoreError::Damaged`]).
+pub fn reopen(
+    path: &Path,
+    format: Format,
+    scratch: &Scratch,
+    state: &SinkState,
+) -> Result<Sink, IoError> {
+    Ok(match format {
+        Format::Obj => Box::new(ObjWriter::reopen(path, scratch, state)?),
+        Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
+        Format::Ply => Box::new(PlyWriter::reopen(path, scratch, state)?),
+        Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
     })
 }

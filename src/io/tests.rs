@@ -101,7 +101,7 @@ fn write(path: &Path, format: Format, positions: &[[f64; 3]], triangles: &[[u32;
     let stats = sink.finish().expect("finishes");
     assert_eq!(stats.triangles, triangles.len() as u64);
     assert_eq!(stats.vertices, positions.len() as u64);
-    assert_eq!(stats.bytes, std::fs::metadata(path).expect("the file").len());
+    assert_eq!(stats.file.bytes, std::fs::metadata(path).expect("the file").len());
 }
 
 const FORMATS: [(Format, &str); 4] = [

@@ -9,5 +9,5 @@ mod sink;
 mod source;
 
 pub use batch::{Material, NO_POLYGON, Part, TriangleBatch};
-pub use sink::{MeshSink, SinkStats};
+pub use sink::{MeshSink, SinkFile, SinkState, SinkStats};
 pub use source::{Discarded, MeshSource};

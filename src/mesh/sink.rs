@@ -1,14 +1,38 @@
 //! The writing end: vertices and triangles into any file.
 
+use serde::{Deserialize, Serialize};
+
+/// A file that a sink has written, as far as it goes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SinkFile {
+    /// Its size.
+    pub bytes: u64,
+    /// Digest of its bytes.
+    pub digest: [u8; 16],
+}
+
+/// How far a sink has come: enough for another one to go on.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+pub struct SinkState {
+    /// Vertices taken.
+    pub vertices: u64,
+    /// Triangles taken.
+    pub triangles: u64,
+    /// The output.
+    pub output: SinkFile,
+    /// What waits beside it, in formats that need that.
+    pub aside: SinkFile,
+}
+
 /// What a sink wrote.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SinkStats {
     /// Vertices written.
     pub vertices: u64,
     /// Triangles written.
     pub triangles: u64,
-    /// Size of the finished file.
-    pub bytes: u64,
+    /// The finished file.
+    pub file: SinkFile,
 }
 
 /// Takes vertices and triangles in order and writes a file.
@@ -40,6 +64,15 @@ pub trait MeshSink {
         indices: &[[u32; 3]],
         corners: &[[[f64; 3]; 3]],
     ) -> Result<(), Self::Error>;
+
+    /// Bytes taken so far, about.
+    fn bytes_so_far(&self) -> u64;
+
+    /// Writes out what is buffered and tells how far the files go.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    fn checkpoint(&mut self) -> Result<SinkState, Self::Error>;
 
     /// Completes the file, and hands its bytes to the disk (fsync).
     ///

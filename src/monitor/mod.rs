@@ -122,6 +122,11 @@ pub trait Monitor: Sync {
     fn gauge(&self, gauge: Gauge, now: u64) {
         let _ = (gauge, now);
     }
+    /// A run that is killed from now on goes on from here: behind a step that is finished, or
+    /// behind `items` of it.
+    fn checkpoint(&self, step: &str, items: u64) {
+        let _ = (step, items);
+    }
     /// A remark for the log.
     fn note(&self, text: &str) {
         let _ = text;

@@ -49,6 +49,9 @@ impl Monitor for Recording<'_> {
         self.gauges[gauge as usize].fetch_max(now, Ordering::Relaxed);
         self.next.gauge(gauge, now);
     }
+    fn checkpoint(&self, step: &str, items: u64) {
+        self.next.checkpoint(step, items);
+    }
     fn note(&self, text: &str) {
         self.next.note(text);
     }

@@ -4,7 +4,9 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::octree::edge_bits::{SIDE, edge_index, edge_position};
 use crate::octree::key::BrickKey;
-use crate::store::{Record, Resources, Sorted, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError};
+use crate::store::{
+    FileState, Record, Resources, Sorted, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError,
+};
 
 /// Spool of the flips.
 pub const FLIPS: &str = "flips.spool";
@@ -96,8 +98,14 @@ impl Flips {
     ///
     /// # Errors
     /// They are missing or damaged.
-    pub fn open(resources: &Resources) -> Result<Self, StoreError> {
-        Ok(Self { spool: Spool::open(resources.scratch, FLIPS)? })
+    pub fn open(resources: &Resources, files: &[FileState]) -> Result<Self, StoreError> {
+        Ok(Self { spool: Spool::open(resources.scratch, FileState::find(files, FLIPS)?)? })
+    }
+
+    /// The file, as it has to be found again.
+    #[must_use]
+    pub fn state(&self) -> &FileState {
+        self.spool.state()
     }
 
     /// Reads the flips brick by brick.

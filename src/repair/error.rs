@@ -1,6 +1,6 @@
 //! What can end a repair without a result.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::contour::{ContourError, WriteError};
 use crate::ingest::IngestError;
@@ -40,6 +40,12 @@ pub enum RepairError {
         found_bytes: u64,
         /// The least that would do, with one thread.
         needed_bytes: u64,
+    },
+    /// The input is not what it was when the run began.
+    #[error("{path} changed while it was read; run again")]
+    InputChanged {
+        /// The input.
+        path: PathBuf,
     },
     /// The output would replace the input.
     #[error("The output {path} is the input itself, which is never touched; give another name")]
@@ -129,8 +135,12 @@ pub enum Blame {
     Lock,
     /// The input file's.
     Input,
+    /// Nobody's in particular: the same command may well work the next time.
+    Temporary,
     /// The caller's: interrupted.
     Interrupted,
+    /// A limit that the user set: stopped on the way, to be gone on with.
+    Limit,
 }
 
 impl RepairError {
@@ -140,8 +150,10 @@ impl RepairError {
         match self {
             Self::Input(error) if error.is_input() => Blame::Input,
             Self::Input(IoError::Store(error)) => blame_store(error),
+            Self::Output(IoError::Store(error)) => blame_store(error),
             Self::Input(_) | Self::Output(_) => Blame::Disk,
             Self::NoTriangle { .. } | Self::Broken { .. } => Blame::Input,
+            Self::InputChanged { .. } => Blame::Temporary,
             Self::BudgetBelowFloor { .. }
             | Self::OutputIsInput { .. }
             | Self::NoUnit { .. }
@@ -164,10 +176,29 @@ impl RepairError {
     /// Whether the work folder may serve a later run, or explain this one.
     #[must_use]
     pub fn keeps_work(&self) -> bool {
-        matches!(self.blame(), Blame::Internal | Blame::Disk | Blame::Interrupted)
+        let blame = self.blame();
+        matches!(blame, Blame::Internal | Blame::Disk | Blame::Interrupted | Blame::Limit)
     }
 
-    pub(crate) fn from_ingest(error: IngestError<IoError>, path: &std::path::Path) -> Self {
+    /// The file of the work folder whose bytes are not those that were written, if that is it.
+    pub(crate) fn damaged_file(&self) -> Option<&Path> {
+        let store = match self {
+            Self::Store(error)
+            | Self::Input(IoError::Store(error))
+            | Self::Output(IoError::Store(error))
+            | Self::ReadBack(IoError::Store(error))
+            | Self::Patch(PatchError::Store(error))
+            | Self::Sign(SignError::Store(error))
+            | Self::Contour(ContourError::Store(error)) => error,
+            _ => return None,
+        };
+        match store {
+            StoreError::Damaged { path, .. } => Some(path),
+            _ => None,
+        }
+    }
+
+    pub(crate) fn from_ingest(error: IngestError<IoError>, path: &Path) -> Self {
         match error {
             IngestError::Source(error) => Self::Input(error),
             IngestError::Store(error) => Self::Store(error),
@@ -196,6 +227,7 @@ impl RepairError {
 fn blame_store(error: &StoreError) -> Blame {
     match error {
         StoreError::Cancelled => Blame::Interrupted,
+        StoreError::DiskLimit { .. } => Blame::Limit,
         StoreError::TooMany { .. } | StoreError::OverBudget { .. } => Blame::Usage,
         _ => Blame::Disk,
     }

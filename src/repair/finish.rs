@@ -2,15 +2,15 @@
 
 use std::collections::BTreeMap;
 
-use crate::contour::ContourStats;
-use crate::ingest::Soup;
 use crate::monitor::{Counter, Gauge, Monitor};
 use crate::repair::outcome::{
-    Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, SCHEMA_VERSION, SoupReport,
-    Verdict,
+    DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
+    SCHEMA_VERSION, SoupReport, Verdict,
 };
+use crate::repair::run::Run;
 use crate::repair::settings::Depth;
-use crate::repair::stages::{Findings, Run};
+use crate::repair::stages::Findings;
+use crate::repair::workspace::Workspace;
 use crate::verify::Proof;
 
 /// Losing more than this share of the area is worth a look.
@@ -18,19 +18,17 @@ const LOST_AREA_SHARE: f64 = 0.2;
 /// So is filling more than this share of the volume.
 const FILLED_VOLUME_SHARE: f64 = 0.05;
 
-/// What the stages brought.
-pub struct Results {
-    pub soup: Soup,
-    pub findings: Findings,
-    pub contour: ContourStats,
-    pub bytes: u64,
-    pub proof: Proof,
-}
-
 /// Makes the outcome of a finished run.
-pub fn conclude(run: &Run, results: Results) -> Outcome {
-    let Results { soup, findings, contour, bytes, proof } = results;
-    let cell_volume = findings.domain.cell_size().powi(3);
+pub fn conclude(
+    run: &Run,
+    workspace: &Workspace,
+    findings: Findings,
+    rebuilt: Vec<String>,
+) -> Outcome {
+    let domain = *findings.domain();
+    let soup = *findings.soup();
+    let proof = findings.proof.clone().unwrap_or_default();
+    let cell_volume = domain.cell_size().powi(3);
     let invented = Invented {
         patch_polygons: findings.sign.patch_crossings,
         sheet_corners: findings.sign.sheet_corners,
@@ -40,7 +38,7 @@ pub fn conclude(run: &Run, results: Results) -> Outcome {
     };
     let dropped = dropped(&findings);
     let area_ratio = proof.area / findings.measure.area;
-    let reasons = reasons(run, &soup, &findings, &invented, &dropped, area_ratio, &proof);
+    let reasons = reasons(run, &findings, &invented, &dropped, area_ratio, &proof);
     run.recording.gauge(Gauge::GrantedBytes, run.accountant.peak_bytes());
     Outcome {
         schema: SCHEMA_VERSION,
@@ -50,14 +48,14 @@ pub fn conclude(run: &Run, results: Results) -> Outcome {
         input: SoupReport {
             path: run.input.to_path_buf(),
             stats: soup.stats,
-            parts: soup.parts.len(),
-            materials: soup.materials.len(),
+            parts: soup.parts,
+            materials: soup.materials,
             bounds: soup.bounds,
             measure: findings.measure,
         },
         settings: *run.settings,
-        grid: findings.domain,
-        cell_size: findings.domain.cell_size(),
+        grid: domain,
+        cell_size: domain.cell_size(),
         found: Found {
             settle: findings.settle,
             odd_faces: findings.patch.odd_faces,
@@ -66,7 +64,13 @@ pub fn conclude(run: &Run, results: Results) -> Outcome {
         },
         invented,
         dropped,
-        output: OutputReport { path: run.output.to_path_buf(), bytes, proof, area_ratio, contour },
+        output: OutputReport {
+            path: run.output.to_path_buf(),
+            bytes: findings.written.file.bytes,
+            proof,
+            area_ratio,
+            contour: findings.contour,
+        },
         scan: findings.scan,
         patch: findings.patch,
         sign: findings.sign,
@@ -79,6 +83,11 @@ pub fn conclude(run: &Run, results: Results) -> Outcome {
             threads: run.plan.threads,
             resident: Gauge::ALL.map(|g| (g, run.recording.peak(g))).into_iter().collect(),
         },
+        disk: DiskReport {
+            limit_bytes: run.limits.max_disk_bytes,
+            peak_bytes: workspace.scratch().peak_bytes(),
+        },
+        resume: ResumeReport { resumptions: workspace.resumptions(), rebuilt },
     }
 }
 
@@ -93,13 +102,13 @@ fn dropped(findings: &Findings) -> Dropped {
 
 fn reasons(
     run: &Run,
-    soup: &Soup,
     findings: &Findings,
     invented: &Invented,
     dropped: &Dropped,
     area_ratio: f64,
     proof: &Proof,
 ) -> Vec<String> {
+    let domain = findings.domain();
     let mut reasons = Vec::new();
     if area_ratio < 1.0 - LOST_AREA_SHARE {
         let lost = (1.0 - area_ratio) * 100.0;
@@ -144,11 +153,11 @@ fn reasons(
         ));
     }
     if let Depth::Tolerance { length, max_depth } = run.settings.depth {
-        let wanted = length.in_model_units(&soup.bounds).unwrap_or(f64::INFINITY);
-        if findings.domain.depth == max_depth && findings.domain.cell_size() > 2.0 * wanted {
+        let wanted = length.in_model_units(&findings.soup().bounds).unwrap_or(f64::INFINITY);
+        if domain.depth == max_depth && domain.cell_size() > 2.0 * wanted {
             reasons.push(format!(
                 "The tolerance {length} asks for more than depth {max_depth}: cells are {}",
-                findings.domain.cell_size()
+                domain.cell_size()
             ));
         }
     }

@@ -8,18 +8,20 @@
 
 mod error;
 mod finish;
+mod lock;
 mod outcome;
 mod plan;
+mod run;
 mod settings;
 mod stages;
+mod step;
 mod workspace;
 
 pub use error::{Blame, RepairError};
 pub use outcome::{
-    Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, SCHEMA_VERSION, SoupReport,
-    StageReport, Verdict,
+    DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
+    SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
 pub use plan::{MemoryPlan, floor_bytes};
+pub use run::repair;
 pub use settings::{Depth, Length, Limits, Settings};
-pub use stages::repair;
-pub use workspace::Workspace;

@@ -37,9 +37,9 @@ pub struct SoupReport {
     #[serde(flatten)]
     pub stats: SoupStats,
     /// Number of parts and materials named in the file.
-    pub parts: usize,
+    pub parts: u64,
     /// See `parts`.
-    pub materials: usize,
+    pub materials: u64,
     /// Box of the finite triangles, model units.
     pub bounds: SnapBox,
     /// Area and signed volume.
@@ -126,6 +126,24 @@ pub struct MemoryReport {
     pub resident: BTreeMap<Gauge, u64>,
 }
 
+/// What the run took of the disk.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DiskReport {
+    /// `--max-disk`, if there is one.
+    pub limit_bytes: Option<u64>,
+    /// The most that the work folder and the output took at one time.
+    pub peak_bytes: u64,
+}
+
+/// Where the run went on from, and what had to be made again.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ResumeReport {
+    /// How often the work was gone on with after it had been stopped.
+    pub resumptions: u32,
+    /// Files of the work folder that were found damaged and made again.
+    pub rebuilt: Vec<String>,
+}
+
 /// Everything about a repair.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Outcome {
@@ -165,4 +183,8 @@ pub struct Outcome {
     pub counters: BTreeMap<Counter, u64>,
     /// Memory.
     pub memory: MemoryReport,
+    /// Disk.
+    pub disk: DiskReport,
+    /// Resumption.
+    pub resume: ResumeReport,
 }

@@ -139,8 +139,14 @@ pub struct Limits {
     pub max_memory_bytes: u64,
     /// Worker threads; fewer are taken when memory is short.
     pub threads: usize,
+    /// Most that the work folder and the output may take of the disk; no limit when `None`.
+    pub max_disk_bytes: Option<u64>,
     /// Where the work folder goes; beside the output when `None`.
     pub work_dir: Option<PathBuf>,
+    /// Discard what an earlier run of the same work left.
+    pub fresh: bool,
+    /// Long steps note their progress each time they have written this much.
+    pub checkpoint_bytes: u64,
     /// Share of every sort and table, for tests of the spilled forms; from the budget when `None`.
     pub share_bytes: Option<u64>,
     /// Where brick files lie.
@@ -152,7 +158,10 @@ impl Default for Limits {
         Self {
             max_memory_bytes: 1 << 30,
             threads: 1,
+            max_disk_bytes: None,
             work_dir: None,
+            fresh: false,
+            checkpoint_bytes: 16 << 20,
             share_bytes: None,
             backing: Backing::Mapped,
         }

@@ -1,195 +1,162 @@
-//! The stages of a repair, one after the other.
+//! The steps of a repair: each opens what earlier ones left, does its work, and names its files.
 
-use std::os::unix::fs::MetadataExt;
-use std::path::Path;
-
-use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
-use crate::contour::{ContourOptions, ContourStats, place_vertices, write_surface};
+use crate::contour::{ContourOptions, ContourStats, WriteProgress, place_vertices, write_surface};
 use crate::defect::DefectKind;
 use crate::ingest::{
-    BinEntry, Bins, DropRecord, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup,
-    settle,
+    BinEntry, Bins, DropRecord, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, fill_bins,
+    read_soup, settle,
 };
-use crate::io::{CoordinateType, Format, IoError, ReadOptions};
-use crate::monitor::{Counter, Monitor, Recording, Stage};
-use crate::octree::{BrickKey, Domain, Flips};
+use crate::io::{CoordinateType, ReadOptions, check_output};
+use crate::mesh::SinkStats;
+use crate::monitor::{Counter, Monitor};
+use crate::octree::{BrickKey, Domain, Flips, SnapBox};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
-use crate::repair::finish::{Results, conclude};
-use crate::repair::outcome::Outcome;
-use crate::repair::plan::MemoryPlan;
-use crate::repair::settings::{Depth, Limits, Settings};
+use crate::repair::run::Run;
+use crate::repair::settings::Depth;
+use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
-use crate::scan::{HAS_ODD_FACES, ScanItem, ScanStats, scan};
-use crate::sign::{FillRule, SignStats, assign_signs};
-use crate::store::{Accountant, Backing, BrickFile, Resources, SpoolPeek, StoreError};
+use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
+use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
+use crate::store::{BrickFile, FileState, Resources, SpoolPeek, StoreError};
 use crate::verify::{Failure, Outward, Proof, ProofOptions, prove};
 
-/// Repairs `input` into `output`, whose format is told by its extension (PLY when it has none).
-///
-/// # Errors
-/// [`RepairError`]; then nothing was put in place.
-pub fn repair(
-    input: &Path,
-    output: &Path,
-    format: Format,
-    settings: &Settings,
-    limits: &Limits,
-    monitor: &dyn Monitor,
-) -> Result<Outcome, RepairError> {
-    let plan = MemoryPlan::within(limits)?;
-    crate::io::detect(input).map_err(RepairError::Input)?;
-    keep_input(input, output)?;
-    let pool = start_threads(plan.threads)?;
-    let recording = Recording::new(monitor);
-    let mut workspace =
-        Workspace::open(output, limits.work_dir.as_deref(), run_key(input, settings)?)?;
-    let accountant = Accountant::new(limits.max_memory_bytes);
-    let run = Run { input, output, format, settings, plan, recording, accountant };
-    match run.all_stages(&mut workspace, &pool, limits.backing) {
-        Ok(outcome) => {
-            workspace.put_in_place()?;
-            Ok(outcome)
-        }
-        Err(error) => {
-            if !error.keeps_work() {
-                workspace.remove();
-            }
-            Err(error)
-        }
-    }
-}
-
-/// Refuses an output that is the input under any name: the rename at the end would replace it.
-fn keep_input(input: &Path, output: &Path) -> Result<(), RepairError> {
-    let identity = |path| std::fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
-    match (identity(input), identity(output)) {
-        (Some(a), Some(b)) if a == b => {
-            Err(RepairError::OutputIsInput { path: output.to_path_buf() })
-        }
-        _ => Ok(()),
-    }
-}
-
-fn start_threads(threads: usize) -> Result<ThreadPool, RepairError> {
-    rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .thread_name(|number| format!("brick-{number}"))
-        .build()
-        .map_err(|source| RepairError::Threads { threads, source })
-}
-
-/// blake3 of input bytes, settings and version: another key is another run.
-fn run_key(input: &Path, settings: &Settings) -> Result<[u8; 32], RepairError> {
-    let mut hasher = blake3::Hasher::new();
-    let read = || -> std::io::Result<blake3::Hasher> {
-        hasher.update_reader(std::fs::File::open(input)?)?;
-        Ok(hasher)
-    };
-    let mut hasher = read().map_err(|source| {
-        RepairError::Input(IoError::Input { doing: "read", path: input.to_path_buf(), source })
-    })?;
-    let settings = serde_json::to_string(settings).expect("plain records serialise");
-    hasher.update(settings.as_bytes());
-    hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
-    hasher.update(&crate::store::FORMAT_VERSION.to_le_bytes());
-    Ok(*hasher.finalize().as_bytes())
-}
-
-/// A run under way.
-pub struct Run<'r> {
-    pub input: &'r Path,
-    pub output: &'r Path,
-    pub format: Format,
-    pub settings: &'r Settings,
-    pub plan: MemoryPlan,
-    pub recording: Recording<'r>,
-    pub accountant: Accountant,
-}
-
-/// What a checkpoint remembers besides the files.
-#[derive(Clone, Debug, Serialize, Deserialize)]
+/// What the finished steps found out; a checkpoint remembers it besides the files.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Findings {
-    pub domain: Domain,
+    soup: Option<SoupFacts>,
+    domain: Option<Domain>,
     pub measure: SoupMeasure,
+    /// Bricks that triangles touch.
+    pub bins: u64,
     pub settle: SettleStats,
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub sign: SignStats,
+    pub contour: ContourStats,
+    pub written: SinkStats,
+    pub proof: Option<Proof>,
+}
+
+impl Findings {
+    /// What was found out about the input.
+    pub fn soup(&self) -> &SoupFacts {
+        self.soup.as_ref().expect("the input is read first")
+    }
+
+    /// The grid.
+    pub fn domain(&self) -> &Domain {
+        self.domain.as_ref().expect("the grid is laid when the input was read")
+    }
+}
+
+/// Brick files that are handed from step to step while the run lasts. A later run, and a step that
+/// finds none here, opens them.
+#[derive(Default)]
+pub struct Handles {
+    hits: Option<BrickFile>,
+    signs: Option<BrickFile>,
+    cells: Option<BrickFile>,
+}
+
+/// The brick file in `held`, or the one that an earlier run left.
+fn open_bricks<'h>(
+    held: &'h mut Option<BrickFile>,
+    name: &str,
+    workspace: &Workspace,
+    resources: &Resources,
+) -> Result<&'h BrickFile, StoreError> {
+    match held {
+        Some(file) => Ok(file),
+        None => {
+            let files = workspace.files();
+            let state = FileState::find(&files, name)?;
+            let file = BrickFile::open(resources.scratch, state, resources.cached_windows)?;
+            Ok(held.insert(file))
+        }
+    }
 }
 
 impl Run<'_> {
-    fn all_stages(
+    /// Does one step; the files that it left.
+    pub(crate) fn step(
         &self,
-        workspace: &mut Workspace,
-        pool: &ThreadPool,
-        backing: Backing,
-    ) -> Result<Outcome, RepairError> {
-        let _leases = self.plan.lease(&self.accountant)?;
-        let scratch = workspace.scratch().clone();
-        let resources = Resources {
-            scratch: &scratch,
-            pool,
-            share_bytes: self.plan.share_bytes,
-            cached_windows: self.plan.cached_windows,
-            backing,
-            monitor: &self.recording,
+        step: Step,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        self.recording.begin(step.stage(), self.work_of(step, findings));
+        let files = match step {
+            Step::Read => self.read(findings, resources)?,
+            Step::Bin => self.bin(workspace, findings, resources)?,
+            Step::Settle => settle_copies(workspace, findings, resources)?,
+            Step::Scan => scan_bins(workspace, findings, handles, resources)?,
+            Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
+            Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
+            Step::Sign => self.sign(workspace, findings, handles, resources)?,
+            Step::Place => self.place(workspace, findings, handles, resources)?,
+            Step::Write => self.write(workspace, findings, handles, resources)?,
+            Step::Prove => self.prove(workspace, findings, resources)?,
         };
-        let (soup, bins, mut findings, settled) = self.ingest(&resources)?;
-        workspace.checkpoint(Stage::Ingest, to_json(&findings))?;
-        let hits = self.scan(&bins, &settled, &mut findings, &resources)?;
-        workspace.checkpoint(Stage::Scan, to_json(&findings))?;
-        let flips = self.patch(&hits, &mut findings, &resources)?;
-        workspace.checkpoint(Stage::Patch, to_json(&findings))?;
-        let signs = self.sign(&hits, &flips, &mut findings, &resources)?;
-        drop(hits);
-        workspace.checkpoint(Stage::Sign, to_json(&findings))?;
-        let (contour, bytes) = self.contour(&signs, &findings, workspace.part(), &resources)?;
-        drop(signs);
-        workspace.checkpoint(Stage::Contour, to_json(&findings))?;
-        let proof = self.verify(workspace, &resources)?;
-        workspace.checkpoint(Stage::Verify, to_json(&findings))?;
-        self.count_scratch(&resources);
-        Ok(conclude(self, Results { soup, findings, contour, bytes, proof }))
+        self.recording.end(step.stage());
+        Ok(files)
     }
 
-    fn ingest(
+    /// How much work a step expects, in the unit in which it tells its progress.
+    fn work_of(&self, step: Step, findings: &Findings) -> u64 {
+        match step {
+            Step::Read => std::fs::metadata(self.input).map_or(0, |file| file.len()),
+            Step::Bin => findings.soup().stats.triangles,
+            Step::Settle | Step::Scan => findings.bins,
+            Step::Patch => findings.scan.open_bricks,
+            Step::Flood | Step::Sign => findings.scan.bricks,
+            Step::Place => findings.sign.bricks,
+            Step::Write => 2 * findings.sign.bricks,
+            Step::Prove => findings.written.triangles,
+        }
+    }
+
+    fn read(
         &self,
+        findings: &mut Findings,
         resources: &Resources,
-    ) -> Result<(Soup, Bins, Findings, Settled), RepairError> {
-        let total = std::fs::metadata(self.input).map_or(0, |m| m.len());
-        self.recording.begin(Stage::Ingest, total);
+    ) -> Result<Vec<FileState>, RepairError> {
         let options = ReadOptions { share_bytes: resources.share_bytes };
         let mut source =
             crate::io::open(self.input, resources.scratch, &options).map_err(RepairError::Input)?;
         let soup = read_soup(&mut *source, self.settings.strict, resources)
             .map_err(|e| RepairError::from_ingest(e, self.input))?;
-        drop(source);
+        self.check_unchanged()?;
+        findings.soup = Some(soup.facts);
         if soup.spool.is_empty() {
-            return Err(self.no_triangle(&soup));
+            return Err(self.no_triangle(findings));
         }
-        let domain = self.choose_domain(&soup)?;
-        let (bins, measure) = fill_bins(&soup, &domain, resources)?;
-        if measure.area == 0.0 {
-            return Err(self.no_triangle(&soup));
-        }
-        let settled = settle(&bins, &domain, soup.stats.triangles, resources)?;
-        self.recording.end(Stage::Ingest);
-        let findings = Findings {
-            domain,
-            measure,
-            settle: settled.stats,
-            scan: ScanStats::default(),
-            patch: PatchStats::default(),
-            sign: SignStats::default(),
-        };
-        Ok((soup, bins, findings, settled))
+        findings.domain = Some(self.choose_domain(&soup.facts.bounds)?);
+        Ok(soup.files())
     }
 
-    fn no_triangle(&self, soup: &Soup) -> RepairError {
-        let stats = &soup.stats;
+    fn bin(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        let soup = Soup::open(resources, &workspace.files(), *findings.soup())?;
+        let (bins, measure) = fill_bins(&soup, findings.domain(), resources)?;
+        findings.measure = measure;
+        findings.bins = bins.entries.len();
+        if measure.area == 0.0 {
+            return Err(self.no_triangle(findings));
+        }
+        Ok(bins.files())
+    }
+
+    fn no_triangle(&self, findings: &Findings) -> RepairError {
+        let stats = &findings.soup().stats;
         let reason = format!(
             "{} read, {} with corners that are not finite, {} faces with wild indices, {} faces \
              with fewer than three corners, {} without area",
@@ -197,22 +164,22 @@ impl Run<'_> {
             stats.nonfinite_triangles,
             stats.discarded.wild_index_faces,
             stats.discarded.short_faces,
-            soup.spool.len()
+            stats.triangles - stats.nonfinite_triangles
         );
         RepairError::NoTriangle { path: self.input.to_path_buf(), reason }
     }
 
-    fn choose_domain(&self, soup: &Soup) -> Result<Domain, RepairError> {
+    fn choose_domain(&self, bounds: &SnapBox) -> Result<Domain, RepairError> {
         let single = self.format.coordinates() == CoordinateType::F32;
         let around = |depth| {
-            Domain::around(&soup.bounds, depth, single)
+            Domain::around(bounds, depth, single)
                 .map_err(|possible_depth| RepairError::OutputTooCoarse { depth, possible_depth })
         };
         match self.settings.depth {
             Depth::Levels(depth) => around(depth),
             Depth::Tolerance { length, max_depth } => {
                 let tolerance = length
-                    .in_model_units(&soup.bounds)
+                    .in_model_units(bounds)
                     .ok_or_else(|| RepairError::NoUnit { path: self.input.to_path_buf() })?;
                 let mut domain = around(*Depth::RANGE.start())?;
                 for depth in *Depth::RANGE.start() + 1..=max_depth {
@@ -226,58 +193,31 @@ impl Run<'_> {
         }
     }
 
-    fn scan(
-        &self,
-        bins: &Bins,
-        settled: &Settled,
-        findings: &mut Findings,
-        resources: &Resources,
-    ) -> Result<BrickFile, RepairError> {
-        self.recording.begin(Stage::Scan, bins.triangles.len());
-        let mut items = ScanItems::new(bins, settled);
-        let (hits, stats) = scan(&bins.triangles, || items.next(), &findings.domain, resources)?;
-        findings.scan = stats;
-        self.recording.end(Stage::Scan);
-        Ok(hits)
-    }
-
-    fn patch(
-        &self,
-        hits: &BrickFile,
-        findings: &mut Findings,
-        resources: &Resources,
-    ) -> Result<Flips, RepairError> {
-        self.recording.begin(Stage::Patch, findings.scan.open_bricks);
-        let cell_units = f64::from(findings.domain.cell_units);
-        let (flips, stats) =
-            patch(hits, HAS_ODD_FACES, cell_units, resources).map_err(RepairError::Patch)?;
-        findings.patch = stats;
-        self.recording.end(Stage::Patch);
-        Ok(flips)
-    }
-
     fn sign(
         &self,
-        hits: &BrickFile,
-        flips: &Flips,
+        workspace: &Workspace,
         findings: &mut Findings,
+        handles: &mut Handles,
         resources: &Resources,
-    ) -> Result<BrickFile, RepairError> {
-        self.recording.begin(Stage::Sign, 2 * findings.scan.bricks);
+    ) -> Result<Vec<FileState>, RepairError> {
+        let files = workspace.files();
+        let flips = Flips::open(resources, &files)?;
+        let flooded = Flooded::open(resources, &files)?;
+        let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
         let rule = self.settings.fill_rule;
-        let (signs, stats) = assign_signs(hits, flips, rule, &findings.domain, resources)
-            .map_err(RepairError::Sign)?;
+        let (signs, stats) =
+            assign_signs(hits, &flips, &flooded, rule, resources).map_err(RepairError::Sign)?;
         findings.sign = stats;
-        self.recording.end(Stage::Sign);
+        handles.hits = None;
         if stats.crossings == 0 {
             return Err(self.empty_result(findings));
         }
-        Ok(signs)
+        Ok(hand_on(signs, &mut handles.signs))
     }
 
     fn empty_result(&self, findings: &Findings) -> RepairError {
         let sign = &findings.sign;
-        let cell = findings.domain.cell_size();
+        let cell = findings.domain().cell_size();
         let reason = if findings.scan.hit_edges == 0 {
             format!("no triangle crosses an edge of the grid, whose cells are {cell} wide")
         } else {
@@ -290,29 +230,66 @@ impl Run<'_> {
         RepairError::EmptyResult { path: self.input.to_path_buf(), reason }
     }
 
-    fn contour(
-        &self,
-        signs: &BrickFile,
-        findings: &Findings,
-        part: &Path,
-        resources: &Resources,
-    ) -> Result<(ContourStats, u64), RepairError> {
-        self.recording.begin(Stage::Contour, 2 * signs.len() as u64);
-        let options =
-            ContourOptions { method: self.settings.method, crease_deg: self.settings.crease_deg };
-        let (cells, mut stats) = place_vertices(signs, &findings.domain, &options, resources)
-            .map_err(RepairError::Contour)?;
-        let mut sink =
-            crate::io::create(part, self.format, resources.scratch).map_err(RepairError::Output)?;
-        write_surface(&cells, &findings.domain, &options, &mut *sink, &mut stats, resources)
-            .map_err(RepairError::from_write)?;
-        let written = sink.finish().map_err(RepairError::Output)?;
-        self.recording.count(Counter::OutputBytesWritten, written.bytes);
-        self.recording.end(Stage::Contour);
-        Ok((stats, written.bytes))
+    fn contour_options(&self) -> ContourOptions {
+        ContourOptions { method: self.settings.method, crease_deg: self.settings.crease_deg }
     }
 
-    fn verify(&self, workspace: &Workspace, resources: &Resources) -> Result<Proof, RepairError> {
+    fn place(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
+        let (cells, stats) =
+            place_vertices(signs, findings.domain(), &self.contour_options(), resources)
+                .map_err(RepairError::Contour)?;
+        findings.contour = stats;
+        handles.signs = None;
+        Ok(hand_on(cells, &mut handles.cells))
+    }
+
+    fn write(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        let cells = open_bricks(&mut handles.cells, crate::contour::CELLS, workspace, resources)?;
+        let start = WriteProgress::noted(resources);
+        let (part, scratch) = (workspace.part(), resources.scratch);
+        let sink = match &start {
+            Some(noted) => crate::io::reopen(part, self.format, scratch, &noted.sink),
+            None => crate::io::create(part, self.format, scratch),
+        };
+        let mut sink = sink.map_err(RepairError::Output)?;
+        let placed = (&findings.contour, start);
+        let options = self.contour_options();
+        findings.contour =
+            write_surface(cells, findings.domain(), &options, placed, &mut *sink, resources)
+                .map_err(RepairError::from_write)?;
+        handles.cells = None;
+        let written = sink.finish().map_err(RepairError::Output)?;
+        self.recording.count(Counter::OutputBytesWritten, written.file.bytes);
+        findings.written = written;
+        Ok(vec![FileState {
+            name: OUTPUT_PART.to_owned(),
+            len_bytes: written.file.bytes,
+            records: written.triangles,
+            root: written.file.digest,
+        }])
+    }
+
+    fn prove(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        // A coordinate may change and the surface stay sound: so the bytes are checked as well.
+        check_output(workspace.part(), &findings.written.file, resources.scratch)?;
         let options = ReadOptions { share_bytes: resources.share_bytes / 4 };
         let mut open = || crate::io::open(workspace.part(), resources.scratch, &options);
         let outward = match self.settings.fill_rule {
@@ -327,7 +304,8 @@ impl Run<'_> {
         let nested = self.settings.fill_rule == FillRule::Evenodd;
         let failures = proof.failures();
         if failures.iter().all(|failure| nested && is_about_nesting(failure)) {
-            return Ok(proof);
+            findings.proof = Some(proof);
+            return Ok(Vec::new());
         }
         let failures: Vec<String> = failures.iter().map(ToString::to_string).collect();
         Err(RepairError::ProofFailed {
@@ -335,13 +313,66 @@ impl Run<'_> {
             folder: workspace.folder().to_path_buf(),
         })
     }
+}
 
-    fn count_scratch(&self, resources: &Resources) {
-        let scratch = resources.scratch;
-        self.recording.count(Counter::ScratchBytesRead, scratch.read_bytes());
-        self.recording.count(Counter::ScratchBytesWritten, scratch.written_bytes());
-        self.recording.count(Counter::SpilledRuns, scratch.spilled_runs());
-    }
+/// Keeps a brick file for the next step; how a later run finds it again.
+fn hand_on(file: BrickFile, held: &mut Option<BrickFile>) -> Vec<FileState> {
+    let state = file.state().cloned();
+    *held = Some(file);
+    state.into_iter().collect()
+}
+
+fn settle_copies(
+    workspace: &Workspace,
+    findings: &mut Findings,
+    resources: &Resources,
+) -> Result<Vec<FileState>, RepairError> {
+    let bins = Bins::open(resources, &workspace.files())?;
+    let triangles = findings.soup().stats.triangles;
+    let settled = settle(&bins, findings.domain(), triangles, resources)?;
+    findings.settle = settled.stats;
+    Ok(vec![settled.drops.state().clone()])
+}
+
+fn scan_bins(
+    workspace: &Workspace,
+    findings: &mut Findings,
+    handles: &mut Handles,
+    resources: &Resources,
+) -> Result<Vec<FileState>, RepairError> {
+    let files = workspace.files();
+    let bins = Bins::open(resources, &files)?;
+    let settled = Settled::open(resources, &files, findings.settle)?;
+    let mut items = ScanItems::new(&bins, &settled);
+    let (hits, stats) = scan(&bins.triangles, || items.next(), findings.domain(), resources)?;
+    findings.scan = stats;
+    Ok(hand_on(hits, &mut handles.hits))
+}
+
+fn patch_bricks(
+    workspace: &Workspace,
+    findings: &mut Findings,
+    handles: &mut Handles,
+    resources: &Resources,
+) -> Result<Vec<FileState>, RepairError> {
+    let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
+    let cell_units = f64::from(findings.domain().cell_units);
+    let (flips, stats) =
+        patch(hits, HAS_ODD_FACES, cell_units, resources).map_err(RepairError::Patch)?;
+    findings.patch = stats;
+    Ok(vec![flips.state().clone()])
+}
+
+fn flood_bricks(
+    workspace: &Workspace,
+    findings: &Findings,
+    handles: &mut Handles,
+    resources: &Resources,
+) -> Result<Vec<FileState>, RepairError> {
+    let flips = Flips::open(resources, &workspace.files())?;
+    let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
+    let flooded = flood(hits, &flips, findings.domain(), resources).map_err(RepairError::Sign)?;
+    Ok(flooded.files())
 }
 
 /// Whether a failure is about which way a component faces, and nothing else.
@@ -350,10 +381,6 @@ pub fn is_about_nesting(failure: &Failure) -> bool {
         failure,
         Failure::Defects(DefectKind::InwardComponent, _) | Failure::UndecidedComponents(_)
     )
-}
-
-fn to_json(findings: &Findings) -> String {
-    serde_json::to_string(findings).expect("plain records serialise")
 }
 
 /// Walks bins and drops side by side.

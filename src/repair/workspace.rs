@@ -1,20 +1,36 @@
 //! The work folder: locked, keyed, and everything of a run in it.
 //!
 //! `OUT.brickmend/` beside the output, or under the work folder that the user names. It holds the
-//! scratch files, the manifest that is replaced after every stage, and the output while it is
-//! written. Removed on success and refusal, kept on interruption.
+//! scratch files, the manifest that says what is finished, and the output while it is written.
+//! Removed on success and refusal, kept on interruption and when the disk fails.
+//!
+//! Invariant:  what the manifest lists is there and checked by digest when it is touched; what it
+//!             does not list is swept. Files that are not ours are never touched.
 
 use std::ffi::OsString;
 use std::fs::File;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::monitor::Stage;
+use crate::io::{FACES, check_output};
+use crate::mesh::SinkFile;
+use crate::monitor::Monitor;
 use crate::repair::RepairError;
-use crate::store::{Manifest, ManifestFile, Scratch, StoreError, save_manifest, sync_folder};
+use crate::repair::lock::{LOCK, lock_folder};
+use crate::repair::settings::Limits;
+use crate::repair::step::{OUTPUT_PART, Step};
+use crate::store::{
+    Backing, Checkpoints, FileState, Manifest, Progress, Scratch, StoreError, directory_name,
+    load_manifest, save_manifest, sync_folder,
+};
 
 /// Ending of work folders.
 const ENDING: &str = "brickmend";
+const MANIFEST: &str = "manifest";
+/// Files that live within one step, and those on the way to a name.
+const PASSING: [&str; 6] =
+    ["manifest.new", "facts.spool", "faces.spool", "even.spool", FACES, MANIFEST];
 
 /// A locked work folder.
 pub struct Workspace {
@@ -22,39 +38,30 @@ pub struct Workspace {
     output: PathBuf,
     part: PathBuf,
     scratch: Scratch,
-    manifest: Manifest,
+    interval_bytes: u64,
+    /// Brick files in memory do not outlive the run.
+    is_kept: bool,
+    manifest: Mutex<Manifest>,
     /// Held until the end of the run.
     _lock: File,
 }
 
 impl Workspace {
-    /// Creates and locks the work folder for `output`. What an earlier run left is discarded.
+    /// Creates and locks the work folder for `output`. What an earlier run of the same `key` has
+    /// finished is kept; all else is discarded.
     ///
     /// # Errors
     /// [`RepairError::Locked`], or the folder cannot be made.
-    pub fn open(
-        output: &Path,
-        work_dir: Option<&Path>,
-        key: [u8; 32],
-    ) -> Result<Self, RepairError> {
+    pub fn open(output: &Path, limits: &Limits, key: [u8; 32]) -> Result<Self, RepairError> {
         let parent = parent_of(output);
         std::fs::metadata(parent).map_err(|e| StoreError::io("find the folder", parent, e))?;
         let mut name = output.file_name().map_or_else(|| OsString::from("out"), OsString::from);
         name.push(".");
         name.push(ENDING);
-        let folder = work_dir.unwrap_or(parent).join(&name);
-        std::fs::create_dir_all(&folder).map_err(|e| StoreError::io("create", &folder, e))?;
-        let lock_path = folder.join("lock");
-        let lock = File::create(&lock_path).map_err(|e| StoreError::io("create", &lock_path, e))?;
-        if let Err(error) = lock.try_lock() {
-            return Err(match error {
-                std::fs::TryLockError::WouldBlock => RepairError::Locked { folder },
-                std::fs::TryLockError::Error(e) => StoreError::io("lock", &lock_path, e).into(),
-            });
-        }
-        sweep(&folder)?;
+        let folder = limits.work_dir.as_deref().unwrap_or(parent).join(&name);
+        let lock = lock_folder(&folder)?;
         let part = if same_device(&folder, parent)? {
-            folder.join("output.part")
+            folder.join(OUTPUT_PART)
         } else {
             // Only a file in the output's own folder can be renamed into place.
             let mut hidden = OsString::from(".");
@@ -62,9 +69,78 @@ impl Workspace {
             hidden.push(".part");
             parent.join(hidden)
         };
-        let scratch = Scratch::new(&folder);
-        let manifest = Manifest { key, ..Manifest::default() };
-        Ok(Self { folder, output: output.to_path_buf(), part, scratch, manifest, _lock: lock })
+        let scratch = Scratch::limited(&folder, limits.max_disk_bytes.unwrap_or(u64::MAX));
+        let workspace = Self {
+            folder,
+            output: output.to_path_buf(),
+            part,
+            scratch,
+            interval_bytes: limits.checkpoint_bytes,
+            is_kept: limits.backing == Backing::Mapped,
+            manifest: Mutex::new(Manifest { key, ..Manifest::default() }),
+            _lock: lock,
+        };
+        workspace.take_over(limits.fresh)?;
+        Ok(workspace)
+    }
+
+    /// Takes over what an earlier run left, as far as it is of use.
+    fn take_over(&self, fresh: bool) -> Result<(), StoreError> {
+        let mut manifest = self.manifest();
+        let usable = |left: &Manifest| !fresh && self.is_kept && left.key == manifest.key;
+        if let Some(mut left) = load_manifest(&self.folder.join(MANIFEST))?.filter(usable) {
+            left.resumptions += 1;
+            *manifest = left;
+            if !self.is_in_place_by(&manifest) {
+                self.forget_lost_files(&mut manifest);
+            }
+        }
+        self.sweep_nameless()?;
+        let is_listed = |name: &str| {
+            let in_progress = manifest.progress.iter().flat_map(|progress| &progress.files);
+            manifest.files.iter().chain(in_progress).any(|file| file.name == name)
+                // The sink's files are told of by its own state.
+                || manifest.progress.is_some()
+                    && next_step(&manifest) == Some(Step::Write)
+                    && (name == OUTPUT_PART || name == FACES)
+        };
+        let listed: Vec<&str> = all_names().filter(|name| is_listed(name)).collect();
+        for name in all_names().filter(|name| !listed.contains(name) && *name != MANIFEST) {
+            self.remove_file(name)?;
+        }
+        for name in listed {
+            self.scratch.adopt(&self.path_of(name));
+            self.scratch.adopt(&self.folder.join(directory_name(name)));
+        }
+        Ok(())
+    }
+
+    /// Goes back to a step whose inputs are all there.
+    fn forget_lost_files(&self, manifest: &mut Manifest) {
+        manifest.files.retain(|file| {
+            std::fs::metadata(self.path_of(&file.name)).is_ok_and(|m| m.len() >= file.len_bytes)
+        });
+        let next = next_step(manifest).unwrap_or(Step::Prove);
+        let step = next.with_inputs(|name| manifest.files.iter().any(|file| file.name == name));
+        if step < next || next_step(manifest).is_none() {
+            go_back(manifest, step);
+        }
+    }
+
+    /// Files that a run lost its life over before they had lost their names.
+    fn sweep_nameless(&self) -> Result<(), StoreError> {
+        let failed = |e| StoreError::io("list", &self.folder, e);
+        for entry in std::fs::read_dir(&self.folder).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            if path.extension().is_some_and(|ending| ending == "tmp") {
+                self.scratch.remove_at(&path)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn manifest(&self) -> MutexGuard<'_, Manifest> {
+        self.manifest.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
     /// The folder.
@@ -85,52 +161,194 @@ impl Workspace {
         &self.part
     }
 
-    /// Commits a stage: what is on disk is what the next stage starts from.
+    fn path_of(&self, name: &str) -> PathBuf {
+        if name == OUTPUT_PART { self.part.clone() } else { self.folder.join(name) }
+    }
+
+    fn remove_file(&self, name: &str) -> Result<(), StoreError> {
+        self.scratch.remove_at(&self.path_of(name))?;
+        self.scratch.remove(&directory_name(name))
+    }
+
+    /// The step to be done next; `None` when all are finished.
+    #[must_use]
+    pub fn next_step(&self) -> Option<Step> {
+        next_step(&self.manifest())
+    }
+
+    /// How often the run was gone on with.
+    #[must_use]
+    pub fn resumptions(&self) -> u32 {
+        self.manifest().resumptions
+    }
+
+    /// What the finished steps found out.
+    #[must_use]
+    pub fn findings(&self) -> String {
+        self.manifest().findings.clone()
+    }
+
+    /// The files that finished steps left.
+    #[must_use]
+    pub fn files(&self) -> Vec<FileState> {
+        self.manifest().files.clone()
+    }
+
+    /// Commits a step: what is on disk is what the next one starts from. Files that are no longer
+    /// of use are removed.
     ///
     /// # Errors
     /// The folder cannot be written.
-    pub fn checkpoint(&mut self, stage: Stage, findings: String) -> Result<(), StoreError> {
-        self.manifest.stages.push(stage.name().to_owned());
-        self.manifest.files = self.list_files()?;
-        self.manifest.findings = findings;
-        save_manifest(&self.folder.join("manifest"), &self.manifest)
-    }
-
-    /// What lies in the folder besides lock and manifest, by name.
-    fn list_files(&self) -> Result<Vec<ManifestFile>, StoreError> {
-        let failed = |e| StoreError::io("list", &self.folder, e);
-        let mut files = Vec::new();
-        for entry in std::fs::read_dir(&self.folder).map_err(failed)? {
-            let entry = entry.map_err(failed)?;
-            let name = entry.file_name().to_string_lossy().into_owned();
-            if name != "lock" && !name.starts_with("manifest") {
-                let len_bytes = entry.metadata().map_err(failed)?.len();
-                files.push(ManifestFile { name, len_bytes });
-            }
+    pub fn finish_step(
+        &self,
+        step: Step,
+        files: Vec<FileState>,
+        findings: String,
+    ) -> Result<(), StoreError> {
+        let mut manifest = self.manifest();
+        manifest.steps.push(step.name().to_owned());
+        manifest.files.extend(files);
+        let (kept, spent) = std::mem::take(&mut manifest.files)
+            .into_iter()
+            .partition::<Vec<_>, _>(|file| step.still_needs(&file.name));
+        manifest.files = kept;
+        manifest.progress = None;
+        manifest.findings = findings;
+        if self.is_kept {
+            save_manifest(&self.folder.join(MANIFEST), &manifest)?;
         }
-        files.sort_by(|a, b| a.name.cmp(&b.name));
-        Ok(files)
+        drop(manifest);
+        spent.iter().try_for_each(|file| self.remove_file(&file.name))
     }
 
-    /// Puts the finished output in its place, and removes the folder.
+    /// Where the running step begins and notes its progress.
+    #[must_use]
+    pub fn checkpoints<'w>(&'w self, step: Step, monitor: &'w dyn Monitor) -> StepCheckpoints<'w> {
+        StepCheckpoints { workspace: self, step, monitor }
+    }
+
+    /// Goes back to the step from which the file at `path` can be made again; `None` when it is
+    /// not one of the work folder.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn go_back_for(&self, path: &Path) -> Result<Option<Step>, StoreError> {
+        let name = match path.file_name().and_then(|name| name.to_str()) {
+            _ if path == self.part => OUTPUT_PART,
+            Some(FACES) => OUTPUT_PART,
+            Some(name) => name.strip_suffix(".directory").unwrap_or(name),
+            None => return Ok(None),
+        };
+        let Some(writer) = Step::writer_of(name) else { return Ok(None) };
+        let mut manifest = self.manifest();
+        let is_there = |file: &str| manifest.files.iter().any(|known| known.name == file);
+        let step = writer.with_inputs(is_there);
+        go_back(&mut manifest, step);
+        if self.is_kept {
+            save_manifest(&self.folder.join(MANIFEST), &manifest)?;
+        }
+        Ok(Some(step))
+    }
+
+    /// Forgets all that was done.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn start_again(&self) -> Result<(), StoreError> {
+        let mut manifest = self.manifest();
+        go_back(&mut manifest, Step::Read);
+        save_manifest(&self.folder.join(MANIFEST), &manifest)
+    }
+
+    /// The output as the writing step left it.
+    #[must_use]
+    pub fn written(&self) -> Option<SinkFile> {
+        written(&self.manifest())
+    }
+
+    /// Whether an earlier run put the proved output in its place and could not tidy up any more.
+    #[must_use]
+    pub fn is_in_place(&self) -> bool {
+        self.is_in_place_by(&self.manifest())
+    }
+
+    fn is_in_place_by(&self, manifest: &Manifest) -> bool {
+        next_step(manifest).is_none()
+            && !self.part.exists()
+            && written(manifest)
+                .is_some_and(|file| check_output(&self.output, &file, &self.scratch).is_ok())
+    }
+
+    /// Puts the finished output in its place.
     ///
     /// # Errors
     /// The output cannot be renamed.
-    pub fn put_in_place(self) -> Result<(), StoreError> {
-        let parent = parent_of(&self.output);
+    pub fn put_in_place(&self) -> Result<(), StoreError> {
         std::fs::rename(&self.part, &self.output)
             .map_err(|e| StoreError::io("put in place", &self.output, e))?;
-        sync_folder(parent)?;
-        self.remove();
-        Ok(())
+        sync_folder(parent_of(&self.output))
     }
 
-    /// Removes the folder and all in it.
+    /// Removes the folder and all that is ours in it.
     pub fn remove(self) {
         // A leftover folder is ugly, not wrong: the next run sweeps it.
-        let _ = std::fs::remove_file(&self.part);
-        let _ = std::fs::remove_dir_all(&self.folder);
+        for name in all_names() {
+            let _ = self.remove_file(name);
+        }
+        let _ = std::fs::remove_file(self.folder.join(LOCK));
+        let _ = std::fs::remove_dir(&self.folder);
     }
+}
+
+/// Checkpoints of the running step in the manifest.
+pub struct StepCheckpoints<'w> {
+    workspace: &'w Workspace,
+    step: Step,
+    monitor: &'w dyn Monitor,
+}
+
+impl Checkpoints for StepCheckpoints<'_> {
+    fn start(&self) -> Option<Progress> {
+        self.workspace.manifest().progress.clone()
+    }
+
+    fn interval_bytes(&self) -> u64 {
+        self.workspace.interval_bytes
+    }
+
+    fn save(&self, progress: Progress) -> Result<(), StoreError> {
+        if !self.workspace.is_kept {
+            return Ok(());
+        }
+        let items = progress.items;
+        let mut manifest = self.workspace.manifest();
+        manifest.progress = Some(progress);
+        save_manifest(&self.workspace.folder.join(MANIFEST), &manifest)?;
+        self.monitor.checkpoint(self.step.name(), items);
+        Ok(())
+    }
+}
+
+fn next_step(manifest: &Manifest) -> Option<Step> {
+    Step::ALL.into_iter().find(|step| !manifest.steps.iter().any(|name| name == step.name()))
+}
+
+fn written(manifest: &Manifest) -> Option<SinkFile> {
+    let file = manifest.files.iter().find(|file| file.name == OUTPUT_PART)?;
+    Some(SinkFile { bytes: file.len_bytes, digest: file.root })
+}
+
+/// Forgets `step` and all that came after it.
+fn go_back(manifest: &mut Manifest, step: Step) {
+    let is_kept = |name: &str| Step::ALL.into_iter().any(|s| s < step && s.name() == name);
+    manifest.steps.retain(|name| is_kept(name));
+    manifest.files.retain(|file| Step::writer_of(&file.name).is_some_and(|writer| writer < step));
+    manifest.progress = None;
+}
+
+/// Every name that a file of ours may have, besides directories and the lock.
+fn all_names() -> impl Iterator<Item = &'static str> {
+    Step::ALL.into_iter().flat_map(Step::writes).copied().chain(PASSING)
 }
 
 fn parent_of(path: &Path) -> &Path {
@@ -145,17 +363,4 @@ fn same_device(a: &Path, b: &Path) -> Result<bool, StoreError> {
         std::fs::metadata(path).map(|m| m.dev()).map_err(|e| StoreError::io("stat", path, e))
     };
     Ok(device(a)? == device(b)?)
-}
-
-/// Removes what an earlier run left, except the lock.
-fn sweep(folder: &Path) -> Result<(), StoreError> {
-    let entries = std::fs::read_dir(folder).map_err(|e| StoreError::io("list", folder, e))?;
-    for entry in entries {
-        let entry = entry.map_err(|e| StoreError::io("list", folder, e))?;
-        if entry.file_name() != "lock" {
-            let path = entry.path();
-            std::fs::remove_file(&path).map_err(|e| StoreError::io("remove", &path, e))?;
-        }
-    }
-    Ok(())
 }

@@ -22,7 +22,7 @@ use crate::monitor::{Counter, Gauge, Resident};
 use crate::octree::{BrickKey, Domain, EdgeBits, HitBrick, SIDE, SoupTriangle, encode};
 use crate::scan::collect::Collector;
 use crate::scan::convert::Converter;
-use crate::store::{BrickFile, BrickWriter, Resources, Spool, StoreError, ordered};
+use crate::store::{BrickFile, BrickPass, Resources, Spool, StoreError, ordered};
 
 pub use collect::CHUNK_HITS;
 
@@ -93,11 +93,13 @@ pub fn scan(
     domain: &Domain,
     resources: &Resources,
 ) -> Result<(BrickFile, ScanStats), StoreError> {
-    let mut writer = BrickWriter::create(resources.scratch, HITS, resources.backing)?;
-    let mut stats = ScanStats::default();
+    let mut pass = BrickPass::<ScanStats>::start(HITS, resources)?;
+    for _ in 0..pass.items() {
+        items()?;
+    }
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
     let bricks = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    ordered(
+    let scanned = ordered(
         resources.pool,
         || if resources.monitor.cancelled() { Err(StoreError::Cancelled) } else { items() },
         || Workspace::new(domain),
@@ -107,15 +109,14 @@ pub fn scan(
         },
         |scanned| {
             resources.monitor.count(Counter::TrianglesScanned, scanned.stats.triangles);
-            resources.monitor.advance(scanned.stats.triangles);
-            stats.add(&scanned.stats);
-            if scanned.stats.bricks == 0 {
-                return Ok(());
+            pass.counts.add(&scanned.stats);
+            if scanned.stats.bricks > 0 {
+                pass.append(scanned.brick.0, scanned.flags, &scanned.bytes)?;
             }
-            writer.append(scanned.brick.0, scanned.flags, &scanned.bytes)
+            pass.item_done()
         },
-    )?;
-    Ok((writer.finish(resources.cached_windows)?, stats))
+    );
+    pass.end(scanned, StoreError::is_stop)
 }
 
 struct Workspace {

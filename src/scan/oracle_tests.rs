@@ -15,7 +15,7 @@ use crate::octree::{
     BrickKey, Domain, EdgeBits, HitEdge, SIDE, SnapBox, decode_hits, edge_position,
 };
 use crate::scan::{HAS_ODD_FACES, ScanItem, scan};
-use crate::store::{Backing, BrickFile, Resources, Scratch};
+use crate::store::{Backing, BrickFile, NoCheckpoints, Resources, Scratch};
 
 /// Normal and min corner of a face, in cells of the grid.
 type Face = (usize, [i64; 3]);
@@ -31,13 +31,14 @@ fn scanned<T>(soup: &[Corners], depth: u32, look: impl FnOnce(&BrickFile, &Domai
         share_bytes: 8 << 20,
         cached_windows: 4,
         backing: Backing::Memory,
+        checkpoints: &NoCheckpoints,
         monitor: &Void,
     };
     let mut source = ListedTriangles::without_indices(soup.to_vec());
     let read = read_soup(&mut source, true, &resources).expect("a sound soup");
-    let domain = Domain::around(&read.bounds, depth, false).expect("room enough");
+    let domain = Domain::around(&read.facts.bounds, depth, false).expect("room enough");
     let (bins, _) = fill_bins(&read, &domain, &resources).expect("room on the disk");
-    let settled = settle(&bins, &domain, read.stats.triangles, &resources).expect("room");
+    let settled = settle(&bins, &domain, read.facts.stats.triangles, &resources).expect("room");
     assert_eq!(settled.stats.duplicate_triangles, 0, "duplicates are another test's business");
     let mut entries = Vec::new();
     bins.entries.read(0, usize::MAX >> 8, &mut entries).expect("readable");

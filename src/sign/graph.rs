@@ -195,11 +195,6 @@ fn push_sides(
 }
 
 impl RegionGraph {
-    /// The number of regions.
-    pub fn region_count(&self) -> u64 {
-        self.regions
-    }
-
     /// Unites all and finds what the outside reaches.
     pub fn flood(
         &mut self,

@@ -1,7 +1,8 @@
 //! Decides what is inside: a sign at every corner, and one crossing on every marked edge.
 //!
 //! In:         the brick file of scan, and the flips of patch.
-//! Out:        a brick file of [`crate::octree::SignBrick`]s, one per brick with a marked edge.
+//! Out:        [`Flooded`], what the outside reaches; then a brick file of
+//!             [`crate::octree::SignBrick`]s, one per brick with a marked edge.
 //! Invariant:  signs are a function of the grid's corners, marks are their differences, so the
 //!             result is closed whatever the hits were; the border of the grid is outside.
 //! Units:      cells; corners are counted as cells.
@@ -9,6 +10,7 @@
 //! Fails:      [`SignError`]: the scratch disk, or bricks that contradict each other.
 //! Source:     Ju 2004, section 5 (sign generation); the region graph and its barrier are ours.
 
+mod flooded;
 mod graph;
 mod load;
 mod parity;
@@ -21,9 +23,12 @@ use crate::monitor::Monitor;
 use crate::octree::{BrickError, BrickIndex, Domain, Flips};
 use crate::sign::graph::{Exterior, GraphBrick, build_graph};
 use crate::sign::parity::base_parities;
-use crate::sign::relabel::{Decisions, relabel};
+use crate::sign::relabel::relabel;
 use crate::sign::sheets::{Sheets, find_sheets};
 use crate::store::{BrickFile, Resources, StoreError};
+
+pub use flooded::{FLOODED, Flooded, FloodedBrick, REGIONS};
+pub use sheets::{SHEETS, SheetCorner};
 
 /// Name of the brick file that sign generation leaves.
 pub const SIGNS: &str = "signs.bricks";
@@ -101,6 +106,33 @@ impl SignStats {
     }
 }
 
+impl SignError {
+    /// Whether the work so far is worth keeping.
+    #[must_use]
+    pub fn is_stop(&self) -> bool {
+        matches!(self, Self::Store(error) if error.is_stop())
+    }
+}
+
+/// Finds what the outside reaches, and the open sheets that become plates.
+///
+/// # Errors
+/// [`SignError`].
+pub fn flood(
+    hits: &BrickFile,
+    flips: &Flips,
+    domain: &Domain,
+    resources: &Resources,
+) -> Result<Flooded, SignError> {
+    let (mut bricks, mut exterior) = reach(hits, flips, None, domain, resources)?;
+    let sheets = find_sheets(hits, flips, &bricks, &mut exterior, resources)?;
+    if !sheets.is_empty() {
+        (bricks, exterior) = reach(hits, flips, Some(&sheets), domain, resources)?;
+    }
+    let parities = base_parities(&bricks);
+    Flooded::write(&bricks, &parities, exterior, sheets, resources)
+}
+
 /// Decides all signs.
 ///
 /// # Errors
@@ -108,41 +140,28 @@ impl SignStats {
 pub fn assign_signs(
     hits: &BrickFile,
     flips: &Flips,
+    flooded: &Flooded,
     rule: FillRule,
-    domain: &Domain,
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
-    let (bricks, mut exterior, mut regions) = flood(hits, flips, None, domain, resources)?;
-    let sheets = find_sheets(hits, flips, &bricks, &mut exterior, resources)?;
-    let bricks = if sheets.is_empty() {
-        bricks
-    } else {
-        let again = flood(hits, flips, Some(&sheets), domain, resources)?;
-        (exterior, regions) = (again.1, again.2);
-        again.0
-    };
-    let parities = base_parities(&bricks);
-    let decisions = Decisions { rule, bricks: &bricks, parities: &parities, sheets: &sheets };
-    let (file, mut stats) = relabel(hits, flips, &decisions, exterior, resources)?;
-    stats.regions = regions;
+    let (file, stats) = relabel(hits, flips, flooded, rule, resources)?;
     note_fill(&stats, resources.monitor);
     Ok((file, stats))
 }
 
 /// Finds all regions and what the outside reaches of them.
-fn flood(
+fn reach(
     hits: &BrickFile,
     flips: &Flips,
     sheets: Option<&Sheets>,
     domain: &Domain,
     resources: &Resources,
-) -> Result<(Vec<GraphBrick>, Exterior, u64), SignError> {
+) -> Result<(Vec<GraphBrick>, Exterior), SignError> {
     let mut graph = build_graph(hits, flips, sheets, resources)?;
     let keys = graph.bricks.iter().map(|brick| brick.key).collect();
     let index = BrickIndex::new(keys, domain.bricks_per_side());
     let exterior = graph.flood(&index, resources)?;
-    let regions = graph.region_count();
-    Ok((graph.bricks, exterior, regions))
+    Ok((graph.bricks, exterior))
 }
 
 fn note_fill(stats: &SignStats, monitor: &dyn Monitor) {

@@ -6,23 +6,16 @@ use crate::octree::{
     PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_hits, edge_position, encode,
     find_regions,
 };
-use crate::sign::graph::{Exterior, GraphBrick};
+use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
-use crate::sign::sheets::Sheets;
 use crate::sign::{FillRule, SIGNS, SignError, SignStats};
-use crate::store::{BrickFile, BrickWriter, Resources, ordered};
-
-/// What the flood says of a region.
-#[derive(Clone, Copy)]
-struct Verdict {
-    exterior: bool,
-    sealed_by_resolution: bool,
-}
+use crate::store::{BrickFile, BrickPass, Resources, ordered};
 
 struct RelabelItem {
     load: LoadItem,
-    base_parity: bool,
-    verdicts: Vec<Verdict>,
+    base_inside: bool,
+    /// What is known of each region.
+    regions: Vec<u8>,
 }
 
 struct Relabelled {
@@ -31,65 +24,52 @@ struct Relabelled {
     stats: SignStats,
 }
 
-/// What is known before the signs are written.
-pub struct Decisions<'d> {
-    /// What counts as inside.
-    pub rule: FillRule,
-    /// The bricks with hits, flips or corners behind sheets.
-    pub bricks: &'d [GraphBrick],
-    /// Parity of their min corners.
-    pub parities: &'d [bool],
-    /// Corners behind sheets.
-    pub sheets: &'d Sheets,
-}
-
 /// Writes the signs of all bricks.
+///
+/// # Errors
+/// [`SignError`].
 pub fn relabel(
     hits: &BrickFile,
     flips: &Flips,
-    decisions: &Decisions,
-    mut exterior: Exterior,
+    flooded: &Flooded,
+    rule: FillRule,
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
-    let mut writer = BrickWriter::create(resources.scratch, SIGNS, resources.backing)?;
-    let mut stats = SignStats::default();
-    let mut items = LoadItems::new(hits, flips, Some(decisions.sheets), resources);
-    let mut number = 0;
+    let mut pass = BrickPass::<SignStats>::start(SIGNS, resources)?;
+    let mut items = LoadItems::new(hits, flips, Some(&flooded.sheets), resources);
+    let mut bricks = flooded.by_brick();
+    for _ in 0..pass.items() {
+        items.next()?;
+        bricks.next()?;
+    }
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    ordered(
+    let relabelled = ordered(
         resources.pool,
         || {
             let Some(load) = items.next()? else { return Ok(None) };
-            let brick = &decisions.bricks[number];
-            debug_assert_eq!(brick.key, load.brick.0);
-            let base_parity = decisions.parities[number];
-            number += 1;
-            let first = brick.first_region;
-            let verdicts = (first..first + u32::from(brick.regions))
-                .map(|region| {
-                    let exterior_here = exterior.reaches(region)?;
-                    let loose = exterior.reaches_past_even(region)?;
-                    let sealed_by_resolution = loose && !exterior_here;
-                    Ok(Verdict { exterior: exterior_here, sealed_by_resolution })
-                })
-                .collect::<Result<_, SignError>>()?;
-            Ok(Some(RelabelItem { load, base_parity, verdicts }))
+            let brick = bricks.next()?.filter(|brick| brick.key == load.brick.0);
+            let position = load.brick.position();
+            let expected = "the bricks of the flood";
+            let brick = brick.ok_or(SignError::Contradiction { brick: position, expected })?;
+            let regions = bricks.regions_of(&brick)?;
+            Ok(Some(RelabelItem { load, base_inside: brick.base_inside == 1, regions }))
         },
         Workspace::default,
         |space, item| {
             let _brick = resident.hold(1);
-            space.relabel(hits, &item, decisions.rule)
+            space.relabel(hits, &item, rule)
         },
         |done: Relabelled| {
-            stats.add(&done.stats);
-            resources.monitor.advance(1);
-            if done.stats.bricks == 0 {
-                return Ok(());
+            pass.counts.add(&done.stats);
+            if done.stats.bricks > 0 {
+                pass.append(done.key, 0, &done.bytes)?;
             }
-            Ok::<(), SignError>(writer.append(done.key, 0, &done.bytes)?)
+            Ok::<(), SignError>(pass.item_done()?)
         },
-    )?;
-    Ok((writer.finish(resources.cached_windows)?, stats))
+    );
+    let (file, mut stats) = pass.end(relabelled, SignError::is_stop)?;
+    stats.regions = flooded.region_count();
+    Ok((file, stats))
 }
 
 #[derive(Default)]
@@ -111,10 +91,10 @@ impl Workspace {
         let view = self.loaded.load(hits, &item.load)?;
         let record = view.as_ref().map(|view| decode_hits(view)).transpose()?;
         let regions = find_regions(&self.loaded.barrier);
-        if usize::from(regions.count) != item.verdicts.len() {
+        if usize::from(regions.count) != item.regions.len() {
             return Err(contradiction(item, "as many regions as before"));
         }
-        self.parity.from_marks(&self.loaded.marks, item.base_parity);
+        self.parity.from_marks(&self.loaded.marks, item.base_inside);
         self.set_signs(&regions, item, rule)?;
         let sheet_corners = self.add_sheets(&item.load.sheet_corners);
         self.marks.set_differences(&self.signs);
@@ -136,9 +116,9 @@ impl Workspace {
         for row in 0..ROWS {
             let (mut inside, mut sealed) = (0, 0);
             for (bits, region) in regions.row(row) {
-                let verdict = item.verdicts[usize::from(region)];
-                inside |= if verdict.exterior { 0 } else { bits };
-                sealed |= if verdict.sealed_by_resolution { bits } else { 0 };
+                let known = item.regions[usize::from(region)];
+                inside |= if known & OUTSIDE != 0 { 0 } else { bits };
+                sealed |= if known & SEALED_BY_RESOLUTION != 0 { bits } else { 0 };
             }
             let parity = self.parity.rows[row];
             if parity & !inside != 0 {

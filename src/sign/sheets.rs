@@ -17,8 +17,12 @@ use crate::sign::SignError;
 use crate::sign::graph::{Exterior, GraphBrick};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::store::{
-    BrickFile, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError, ordered,
+    BrickFile, FileState, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError,
+    ordered,
 };
+
+/// Spool of the corners behind sheets.
+pub const SHEETS: &str = "sheets.spool";
 
 /// A corner of a brick that is inside because a sheet passes in front of it. 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -83,7 +87,7 @@ pub fn find_sheets(
         },
         |found: Vec<SheetCorner>| Ok(corners.extend(&found)?),
     )?;
-    let mut spool = SpoolWriter::create(resources.scratch, "sheets.spool")?;
+    let mut spool = SpoolWriter::create(resources.scratch, SHEETS)?;
     let mut sorted = corners.finish()?;
     let mut last = None;
     while let Some(corner) = sorted.next()? {
@@ -134,6 +138,16 @@ fn push_in_bricks(brick: BrickKey, at: [usize; 3], corners: &mut Vec<SheetCorner
 }
 
 impl Sheets {
+    /// Opens the corners that an earlier run found.
+    pub fn open(resources: &Resources, files: &[FileState]) -> Result<Self, StoreError> {
+        Ok(Self { spool: Spool::open(resources.scratch, FileState::find(files, SHEETS)?)? })
+    }
+
+    /// The file, as it has to be found again.
+    pub fn state(&self) -> &FileState {
+        self.spool.state()
+    }
+
     /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.spool.is_empty()

@@ -40,6 +40,17 @@ pub enum StoreError {
         /// The whole budget.
         budget_bytes: u64,
     },
+    /// The work folder and the output have reached the limit that the user set.
+    #[error(
+        "{needed_bytes} bytes of disk are needed now, the limit is {limit_bytes}; \
+         run again with more to go on"
+    )]
+    DiskLimit {
+        /// What would lie on the disk with the next write.
+        needed_bytes: u64,
+        /// The limit.
+        limit_bytes: u64,
+    },
     /// More records than the format can number.
     #[error("{what}: more than {limit} are not supported")]
     TooMany {
@@ -57,5 +68,21 @@ impl StoreError {
     /// Wraps a system error with what was tried and where.
     pub fn io(doing: &'static str, path: &Path, source: std::io::Error) -> Self {
         Self::Io { doing, path: path.to_path_buf(), source }
+    }
+
+    pub(crate) fn damaged(
+        path: &Path,
+        offset: u64,
+        expected: impl Into<String>,
+        found: impl Into<String>,
+    ) -> Self {
+        let (path, expected, found) = (path.to_path_buf(), expected.into(), found.into());
+        Self::Damaged { path, offset, expected, found }
+    }
+
+    /// Whether the work so far is worth keeping: the run was stopped, it did not go wrong.
+    #[must_use]
+    pub fn is_stop(&self) -> bool {
+        matches!(self, Self::Cancelled | Self::DiskLimit { .. } | Self::Io { .. })
     }
 }

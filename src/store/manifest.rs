@@ -1,16 +1,15 @@
-//! The manifest of a work folder: what is finished, committed atomically after every stage.
+//! The manifest of a work folder: what is finished, replaced in one go after every step.
 //!
 //! A manifest that is missing, cut short, changed or of another version is no manifest: the run
-//! starts anew. See docs/format.md.
+//! starts anew. It is not handed to the disk at once: after a power cut it may be an older one, or
+//! none, and what it lists is checked by digest anyway. See docs/format.md.
 
-use std::fs::File;
-use std::io::Write;
 use std::path::Path;
 
 use rkyv::rancor::BoxedError;
 use rkyv::{Archive, Deserialize, Serialize};
 
-use crate::store::{FORMAT_VERSION, StoreError, sync_folder};
+use crate::store::{FORMAT_VERSION, FileState, Progress, StoreError};
 
 const MAGIC: [u8; 8] = *b"BRMDMANI";
 const HEADER_BYTES: usize = 48;
@@ -20,24 +19,19 @@ const HEADER_BYTES: usize = 48;
 pub struct Manifest {
     /// blake3 of input bytes, settings that change the result, version and format.
     pub key: [u8; 32],
-    /// Names of the finished stages, in running order.
-    pub stages: Vec<String>,
-    /// Files that the finished stages left.
-    pub files: Vec<ManifestFile>,
-    /// What the stages found out, as the caller's own text (JSON).
+    /// Names of the finished steps, in running order.
+    pub steps: Vec<String>,
+    /// Files that the finished steps left, and that are still needed.
+    pub files: Vec<FileState>,
+    /// How far the step after those has come, if it said so.
+    pub progress: Option<Progress>,
+    /// What the steps found out, as the caller's own text (JSON).
     pub findings: String,
+    /// How often the run was gone on with.
+    pub resumptions: u32,
 }
 
-/// A file named by the manifest.
-#[derive(Clone, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
-pub struct ManifestFile {
-    /// Its name in the work folder.
-    pub name: String,
-    /// Its size.
-    pub len_bytes: u64,
-}
-
-/// Replaces the manifest at `path`: written beside it, synchronised, renamed.
+/// Replaces the manifest at `path`: written beside it, then renamed.
 ///
 /// # Errors
 /// The folder cannot be written.
@@ -50,14 +44,8 @@ pub fn save_manifest(path: &Path, manifest: &Manifest) -> Result<(), StoreError>
     bytes.extend_from_slice(blake3::hash(&body).as_bytes());
     bytes.extend_from_slice(&body);
     let beside = path.with_extension("new");
-    let write = || -> std::io::Result<()> {
-        let mut file = File::create(&beside)?;
-        file.write_all(&bytes)?;
-        file.sync_all()?;
-        std::fs::rename(&beside, path)
-    };
-    write().map_err(|e| StoreError::io("write", path, e))?;
-    sync_folder(path.parent().unwrap_or(Path::new(".")))
+    std::fs::write(&beside, &bytes).map_err(|e| StoreError::io("write", &beside, e))?;
+    std::fs::rename(&beside, path).map_err(|e| StoreError::io("replace", path, e))
 }
 
 /// The manifest at `path`, or `None` when there is none that can be trusted.
@@ -94,9 +82,15 @@ mod tests {
         assert_eq!(load_manifest(&path).expect("no file is no error"), None);
         let manifest = Manifest {
             key: [7; 32],
-            stages: vec!["ingest".to_owned(), "scan".to_owned()],
-            files: vec![ManifestFile { name: "bins".to_owned(), len_bytes: 96 }],
+            steps: vec!["read".to_owned(), "bin".to_owned()],
+            files: vec![FileState {
+                name: "bins".to_owned(),
+                len_bytes: 96,
+                ..FileState::default()
+            }],
+            progress: Some(Progress { items: 7, ..Progress::default() }),
             findings: "{}".to_owned(),
+            resumptions: 1,
         };
         save_manifest(&path, &manifest).expect("save works");
         assert_eq!(load_manifest(&path).expect("load works"), Some(manifest));

@@ -4,29 +4,38 @@
 //! memory budget has a form on disk that gives the same answer.
 
 mod accountant;
-mod brick_file;
+mod brick;
+mod brick_pass;
+mod checkpoint;
+mod digest;
 mod error;
 mod manifest;
 mod mapped;
 mod pipeline;
 mod resources;
 mod scratch;
+mod scratch_file;
 mod sort;
 mod spool;
 mod table;
 mod unite;
 
 pub use accountant::{Accountant, Lease};
-pub use brick_file::{Backing, BrickFile, BrickWriter, DirectoryEntry, View};
+pub use brick::{Backing, BrickFile, BrickWriter, DirectoryEntry, View, directory_name};
+pub use brick_pass::BrickPass;
+pub use checkpoint::{Checkpoints, FileState, NoCheckpoints, Progress};
+pub(crate) use digest::digest;
+pub use digest::{DIGEST_BYTES, Digest, Digester};
 pub use error::StoreError;
-pub use manifest::{Manifest, ManifestFile, load_manifest, save_manifest};
+pub use manifest::{Manifest, load_manifest, save_manifest};
 pub use pipeline::ordered;
 pub use resources::Resources;
 pub use scratch::{Scratch, sync_folder};
+pub use scratch_file::ScratchFile;
 pub use sort::{Record, Sorted, Sorter};
 pub use spool::{Spool, SpoolPeek, SpoolReader, SpoolWriter};
 pub use table::Table;
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.
-pub const FORMAT_VERSION: u32 = 1;
+pub const FORMAT_VERSION: u32 = 2;

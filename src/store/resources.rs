@@ -1,9 +1,9 @@
-//! What a stage may use: scratch, threads, its share of memory, and the caller's ear.
+//! What a stage may use: scratch, threads, its share of memory, checkpoints, and the caller's ear.
 
 use rayon::ThreadPool;
 
 use crate::monitor::Monitor;
-use crate::store::{Backing, Scratch};
+use crate::store::{Backing, Checkpoints, Scratch};
 
 /// What `repair` lends to a stage.
 #[derive(Clone, Copy)]
@@ -18,6 +18,8 @@ pub struct Resources<'r> {
     pub cached_windows: usize,
     /// Where brick files lie.
     pub backing: Backing,
+    /// Where the running step begins, and notes how far it has come.
+    pub checkpoints: &'r dyn Checkpoints,
     /// Who hears of progress, and may stop the work.
     pub monitor: &'r dyn Monitor,
 }

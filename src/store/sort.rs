@@ -10,11 +10,11 @@
 
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
-use std::fs::File;
+use std::sync::Arc;
 
 use bytemuck::Pod;
 
-use crate::store::{Scratch, StoreError};
+use crate::store::{Scratch, ScratchFile, StoreError};
 
 /// A fixed-size record with a total sort key.
 pub trait Record: Pod + Send + Sync {
@@ -41,7 +41,7 @@ pub struct Sorter<R: Record> {
 
 #[derive(Default)]
 struct Runs {
-    file: Option<File>,
+    file: Option<Arc<ScratchFile>>,
     end: u64,
     extents: Vec<(u64, u64)>,
 }
@@ -157,19 +157,16 @@ impl<R: Record> Sorter<R> {
         while self.runs.extents.len() > fan_in {
             self.cascade(fan_in)?;
         }
-        let merge = Merge::new(&self.scratch, self.runs, self.share_bytes)?;
+        let merge = Merge::new(self.runs, self.share_bytes)?;
         Ok(Sorted { source: SortedSource::Merge(Box::new(merge)) })
     }
 
     /// Merges groups of `fan_in` runs into longer runs, in a new file.
     fn cascade(&mut self, fan_in: usize) -> Result<(), StoreError> {
         let old = std::mem::take(&mut self.runs);
-        let file = old.file.as_ref();
         for group in old.extents.chunks(fan_in - 1) {
-            let handle = file.map(File::try_clone).transpose();
-            let handle = handle.map_err(|e| StoreError::io("reopen", self.scratch.folder(), e))?;
-            let part = Runs { file: handle, end: old.end, extents: group.to_vec() };
-            let mut merge = Merge::<R>::new(&self.scratch, part, self.share_bytes)?;
+            let part = Runs { file: old.file.clone(), end: old.end, extents: group.to_vec() };
+            let mut merge = Merge::<R>::new(part, self.share_bytes)?;
             let start = self.runs.end;
             let mut count = 0;
             let mut block: Vec<R> = Vec::with_capacity(PAGE_BYTES.div_ceil(size_of::<R>()));
@@ -203,10 +200,10 @@ fn order_of<R: Record>(records: &[R]) -> Vec<(R::Key, u32)> {
 impl Runs {
     fn write(&mut self, scratch: &Scratch, bytes: &[u8]) -> Result<(), StoreError> {
         if self.file.is_none() {
-            self.file = Some(scratch.anonymous("sort")?);
+            self.file = Some(Arc::new(scratch.anonymous("sort")?));
         }
         let file = self.file.as_ref().expect("the file was opened above");
-        scratch.write_at(file, bytes, self.end)?;
+        file.write_at(bytes, self.end)?;
         self.end += bytes.len() as u64;
         Ok(())
     }
@@ -242,8 +239,7 @@ impl<R: Record> Sorted<R> {
 }
 
 struct Merge<R: Record> {
-    scratch: Scratch,
-    file: File,
+    file: Arc<ScratchFile>,
     cursors: Vec<Cursor<R>>,
     heap: BinaryHeap<Reverse<(R::Key, usize)>>,
     block_records: usize,
@@ -257,7 +253,7 @@ struct Cursor<R> {
 }
 
 impl<R: Record> Merge<R> {
-    fn new(scratch: &Scratch, runs: Runs, share_bytes: usize) -> Result<Self, StoreError> {
+    fn new(runs: Runs, share_bytes: usize) -> Result<Self, StoreError> {
         let file = runs.file.expect("a merge has runs");
         let block_records = (share_bytes / runs.extents.len() / size_of::<R>()).max(1);
         let cursors = runs
@@ -266,7 +262,7 @@ impl<R: Record> Merge<R> {
             .map(|&(offset, left)| Cursor { offset, left, block: Vec::new(), at: 0 })
             .collect::<Vec<_>>();
         let heap = BinaryHeap::with_capacity(cursors.len());
-        let mut merge = Self { scratch: scratch.clone(), file, cursors, heap, block_records };
+        let mut merge = Self { file, cursors, heap, block_records };
         for run in 0..merge.cursors.len() {
             merge.advance(run)?;
         }
@@ -285,7 +281,7 @@ impl<R: Record> Merge<R> {
             }
             cursor.block.resize(count, R::zeroed());
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut cursor.block);
-            self.scratch.read_at(&self.file, bytes, cursor.offset)?;
+            self.file.read_at(bytes, cursor.offset)?;
             cursor.offset += (count * size_of::<R>()) as u64;
             cursor.left -= count as u64;
             cursor.at = 0;

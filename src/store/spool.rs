@@ -1,24 +1,35 @@
 //! Spools: fixed records in file order, written once and read back in ranges.
 //!
-//! Memory: one block for a writer, one block for a reader.
+//! Invariant:  every block of records has a digest, and is checked when a record of it is read for
+//!             the first time.
+//! Memory:     one block for a writer, two for a reader; 16 bytes a block of 128 KiB.
+//! Fails:      [`StoreError::Damaged`] when the bytes are not those that were written.
 
-use std::fs::{File, OpenOptions};
 use std::marker::PhantomData;
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use bytemuck::Pod;
 
-use crate::store::{FORMAT_VERSION, Scratch, StoreError};
+use crate::store::{
+    DIGEST_BYTES, Digest, FORMAT_VERSION, FileState, Scratch, ScratchFile, StoreError, digest,
+};
 
 const MAGIC: [u8; 8] = *b"BRMDSPOL";
 const HEADER_BYTES: u64 = 64;
 const BLOCK_BYTES: usize = 128 << 10;
 
+/// Records that share a digest.
+const fn block_records<R>() -> usize {
+    BLOCK_BYTES / size_of::<R>()
+}
+
 /// Appends records to a spool.
 pub struct SpoolWriter<R: Pod> {
-    scratch: Scratch,
-    file: File,
+    file: ScratchFile,
+    name: String,
     block: Vec<R>,
     len: u64,
+    digests: Vec<Digest>,
 }
 
 impl<R: Pod> SpoolWriter<R> {
@@ -27,12 +38,9 @@ impl<R: Pod> SpoolWriter<R> {
     /// # Errors
     /// The file cannot be created.
     pub fn create(scratch: &Scratch, name: &str) -> Result<Self, StoreError> {
-        let path = scratch.path(name);
-        let opened =
-            OpenOptions::new().read(true).write(true).create(true).truncate(true).open(&path);
-        let file = opened.map_err(|e| StoreError::io("create", &path, e))?;
-        let block = Vec::with_capacity(BLOCK_BYTES / size_of::<R>());
-        Ok(Self { scratch: scratch.clone(), file, block, len: 0 })
+        let block = Vec::with_capacity(block_records::<R>());
+        let (file, name) = (scratch.create(name)?, name.to_owned());
+        Ok(Self { file, name, block, len: 0, digests: Vec::new() })
     }
 
     /// Appends a record.
@@ -43,7 +51,7 @@ impl<R: Pod> SpoolWriter<R> {
     pub fn push(&mut self, record: R) -> Result<(), StoreError> {
         self.block.push(record);
         self.len += 1;
-        if self.block.len() == self.block.capacity() { self.flush() } else { Ok(()) }
+        if self.block.len() == block_records::<R>() { self.flush() } else { Ok(()) }
     }
 
     /// The number of records so far.
@@ -59,9 +67,13 @@ impl<R: Pod> SpoolWriter<R> {
     }
 
     fn flush(&mut self) -> Result<(), StoreError> {
+        if self.block.is_empty() {
+            return Ok(());
+        }
         let first = self.len - self.block.len() as u64;
-        let offset = HEADER_BYTES + first * size_of::<R>() as u64;
-        self.scratch.write_at(&self.file, bytemuck::cast_slice(&self.block), offset)?;
+        let bytes: &[u8] = bytemuck::cast_slice(&self.block);
+        self.digests.push(digest(bytes));
+        self.file.write_at(bytes, offset_of::<R>(first))?;
         self.block.clear();
         Ok(())
     }
@@ -72,81 +84,159 @@ impl<R: Pod> SpoolWriter<R> {
     /// The disk is full.
     pub fn finish(mut self) -> Result<Spool<R>, StoreError> {
         self.flush()?;
-        let mut header = [0; HEADER_BYTES as usize];
-        header[..8].copy_from_slice(&MAGIC);
-        header[8..12].copy_from_slice(&FORMAT_VERSION.to_le_bytes());
-        header[12..16].copy_from_slice(&(size_of::<R>() as u32).to_le_bytes());
+        let digests: &[u8] = bytemuck::cast_slice(&self.digests);
+        let end = offset_of::<R>(self.len);
+        self.file.write_at(digests, end)?;
+        let mut header = header::<R>();
         header[16..24].copy_from_slice(&self.len.to_le_bytes());
-        self.scratch.write_at(&self.file, &header, 0)?;
-        Ok(Spool { scratch: self.scratch, file: self.file, len: self.len, records: PhantomData })
+        header[24..40].copy_from_slice(&digest(digests));
+        self.file.write_at(&header, 0)?;
+        let state = FileState {
+            name: self.name,
+            len_bytes: end + digests.len() as u64,
+            records: self.len,
+            root: digest(digests),
+        };
+        Ok(Spool::new(self.file, state, self.digests))
     }
+}
+
+fn header<R>() -> [u8; HEADER_BYTES as usize] {
+    let mut header = [0; HEADER_BYTES as usize];
+    header[..8].copy_from_slice(&MAGIC);
+    header[8..12].copy_from_slice(&FORMAT_VERSION.to_le_bytes());
+    header[12..16].copy_from_slice(&(size_of::<R>() as u32).to_le_bytes());
+    header
+}
+
+/// Where record `number` starts.
+fn offset_of<R>(number: u64) -> u64 {
+    HEADER_BYTES + number * size_of::<R>() as u64
 }
 
 /// A finished spool. Shared freely between threads.
 pub struct Spool<R: Pod> {
-    scratch: Scratch,
-    file: File,
-    len: u64,
+    file: ScratchFile,
+    state: FileState,
+    digests: Vec<Digest>,
+    checked: Vec<AtomicU64>,
     records: PhantomData<R>,
 }
 
 impl<R: Pod> Spool<R> {
+    fn new(file: ScratchFile, state: FileState, digests: Vec<Digest>) -> Self {
+        let checked = (0..digests.len().div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
+        Self { file, state, digests, checked, records: PhantomData }
+    }
+
     /// Opens a spool that an earlier run finished.
     ///
     /// # Errors
-    /// It is missing, cut short, or of another version or record size.
-    pub fn open(scratch: &Scratch, name: &str) -> Result<Self, StoreError> {
-        let path = scratch.path(name);
-        let file = File::open(&path).map_err(|e| StoreError::io("open", &path, e))?;
-        let mut header = [0; HEADER_BYTES as usize];
-        scratch.read_at(&file, &mut header, 0)?;
-        let mut expected = [0; 16];
-        expected[..8].copy_from_slice(&MAGIC);
-        expected[8..12].copy_from_slice(&FORMAT_VERSION.to_le_bytes());
-        expected[12..].copy_from_slice(&(size_of::<R>() as u32).to_le_bytes());
-        let mut len = [0; 8];
-        len.copy_from_slice(&header[16..24]);
-        let len = u64::from_le_bytes(len);
-        let there = file.metadata().map_err(|e| StoreError::io("stat", &path, e))?.len();
-        let whole = len.checked_mul(size_of::<R>() as u64).map(|bytes| bytes + HEADER_BYTES);
-        if header[..16] != expected || whole != Some(there) {
-            return Err(StoreError::Damaged {
-                path,
-                offset: 0,
-                expected: format!("a spool of {} byte records", size_of::<R>()),
-                found: format!("{:02x?} in {there} bytes", &header[..24]),
-            });
+    /// It is missing, cut short, of another version or record size, or not what `state` says.
+    pub fn open(scratch: &Scratch, state: &FileState) -> Result<Self, StoreError> {
+        let file = scratch.open(&state.name)?;
+        let blocks = state.records.div_ceil(block_records::<R>() as u64);
+        let data_bytes = state.records.checked_mul(size_of::<R>() as u64);
+        let whole = data_bytes.and_then(|data| data.checked_add(HEADER_BYTES));
+        let whole = whole.and_then(|end| end.checked_add(blocks * DIGEST_BYTES as u64));
+        let there = file.len_bytes()?;
+        if whole != Some(there) || there != state.len_bytes {
+            let expected = format!("{} records of {} bytes", state.records, size_of::<R>());
+            let found = format!("{there} bytes");
+            return Err(StoreError::damaged(file.path(), there, expected, found));
         }
-        Ok(Self { scratch: scratch.clone(), file, len, records: PhantomData })
+        let mut found = [0; HEADER_BYTES as usize];
+        file.read_at(&mut found, 0)?;
+        let mut expected = header::<R>();
+        expected[16..24].copy_from_slice(&state.records.to_le_bytes());
+        expected[24..40].copy_from_slice(&state.root);
+        if found != expected {
+            let found = format!("{:02x?}", &found[..40]);
+            return Err(StoreError::damaged(file.path(), 0, "the header of this spool", found));
+        }
+        let mut digests = vec![Digest::default(); blocks as usize];
+        let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut digests);
+        file.read_at(bytes, offset_of::<R>(state.records))?;
+        if digest(bytes) != state.root {
+            let offset = offset_of::<R>(state.records);
+            let expected = format!("digests with digest {:02x?}", state.root);
+            return Err(StoreError::damaged(file.path(), offset, expected, "others"));
+        }
+        Ok(Self::new(file, state.clone(), digests))
+    }
+
+    /// How it is found again.
+    #[must_use]
+    pub fn state(&self) -> &FileState {
+        &self.state
     }
 
     /// The number of records.
     #[must_use]
     pub fn len(&self) -> u64 {
-        self.len
+        self.state.records
     }
 
     /// Whether there is no record.
     #[must_use]
     pub fn is_empty(&self) -> bool {
-        self.len == 0
+        self.len() == 0
     }
 
     /// Replaces `records` by those from `first` on, at most `count` of them.
     ///
     /// # Errors
-    /// The disk fails.
+    /// The disk fails, or the records are not those that were written.
     pub fn read(&self, first: u64, count: usize, records: &mut Vec<R>) -> Result<(), StoreError> {
-        let count = (self.len.saturating_sub(first)).min(count as u64) as usize;
-        records.resize(count, R::zeroed());
-        let offset = HEADER_BYTES + first * size_of::<R>() as u64;
-        self.scratch.read_at(&self.file, bytemuck::cast_slice_mut(records), offset)
+        let count = (self.len().saturating_sub(first)).min(count as u64);
+        records.resize(count as usize, R::zeroed());
+        let per_block = block_records::<R>() as u64;
+        let end = first + count;
+        let mut at = first;
+        while at < end {
+            let block = at / per_block;
+            let block_start = block * per_block;
+            let block_end = (block_start + per_block).min(self.len());
+            let upto = block_end.min(end);
+            let part = &mut records[(at - first) as usize..(upto - first) as usize];
+            let is_checked = self.is_checked(block);
+            if is_checked || (at == block_start && upto == block_end) {
+                self.file.read_at(bytemuck::cast_slice_mut(part), offset_of::<R>(at))?;
+                if !is_checked {
+                    self.check(block, bytemuck::cast_slice(part))?;
+                }
+            } else {
+                let mut whole = vec![R::zeroed(); (block_end - block_start) as usize];
+                self.file
+                    .read_at(bytemuck::cast_slice_mut(&mut whole), offset_of::<R>(block_start))?;
+                self.check(block, bytemuck::cast_slice(&whole))?;
+                part.copy_from_slice(&whole[(at - block_start) as usize..][..part.len()]);
+            }
+            at = upto;
+        }
+        Ok(())
+    }
+
+    fn is_checked(&self, block: u64) -> bool {
+        self.checked[block as usize / 64].load(Ordering::Relaxed) >> (block % 64) & 1 == 1
+    }
+
+    fn check(&self, block: u64, bytes: &[u8]) -> Result<(), StoreError> {
+        let (expected, found) = (self.digests[block as usize], digest(bytes));
+        if found != expected {
+            let offset = offset_of::<R>(block * block_records::<R>() as u64);
+            let expected = format!("a block with digest {expected:02x?}");
+            let found = format!("{found:02x?}");
+            return Err(StoreError::damaged(self.file.path(), offset, expected, found));
+        }
+        self.checked[block as usize / 64].fetch_or(1 << (block % 64), Ordering::Relaxed);
+        Ok(())
     }
 
     /// Reads the records `first..first + count` block by block.
     #[must_use]
     pub fn reader(&self, first: u64, count: u64) -> SpoolReader<'_, R> {
-        let end = (first + count).min(self.len);
+        let end = (first + count).min(self.len());
         SpoolReader { spool: self, next: first, end, block: Vec::new() }
     }
 }
@@ -165,7 +255,9 @@ impl<R: Pod> SpoolReader<'_, R> {
     /// # Errors
     /// The disk fails.
     pub fn next_block(&mut self) -> Result<Option<&[R]>, StoreError> {
-        let count = (self.end - self.next).min((BLOCK_BYTES / size_of::<R>()) as u64);
+        // Up to the end of a block: then whole blocks follow, which are read and checked at once.
+        let per_block = block_records::<R>() as u64;
+        let count = (self.end - self.next).min(per_block - self.next % per_block);
         if count == 0 {
             return Ok(None);
         }
@@ -234,27 +326,65 @@ impl<'s, R: Pod> SpoolPeek<'s, R> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::os::unix::fs::FileExt;
+
+    fn written(scratch: &Scratch, records: u32) -> Spool<[u32; 4]> {
+        let mut writer = SpoolWriter::create(scratch, "spool").expect("create works");
+        for i in 0..records {
+            writer.push([i, 1, 2, 3]).expect("push works");
+        }
+        writer.finish().expect("finish works")
+    }
 
     #[test]
     fn a_spool_reads_back_in_ranges_and_reopens() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let scratch = Scratch::new(folder.path());
-        let mut writer = SpoolWriter::<[u32; 5]>::create(&scratch, "spool").expect("create works");
-        for i in 0..30_000 {
-            writer.push([i, 1, 2, 3, i * 2]).expect("push works");
-        }
-        drop(writer.finish().expect("finish works"));
-        let spool = Spool::<[u32; 5]>::open(&scratch, "spool").expect("open works");
-        let mut reader = spool.reader(9_000, 20_000);
-        let mut expected = 9_000;
-        while let Some(block) = reader.next_block().expect("read works") {
-            for record in block {
-                assert_eq!(*record, [expected, 1, 2, 3, expected * 2]);
-                expected += 1;
+        for records in [0, 1, 8192, 8193, 30_000] {
+            let state = written(&scratch, records).state().clone();
+            let spool = Spool::<[u32; 4]>::open(&scratch, &state).expect("open works");
+            for (first, count) in [(records / 3, records / 2), (0, records), (records, 1)] {
+                let mut reader = spool.reader(first.into(), count.into());
+                let mut expected = first;
+                while let Some(block) = reader.next_block().expect("read works") {
+                    for record in block {
+                        assert_eq!(*record, [expected, 1, 2, 3]);
+                        expected += 1;
+                    }
+                }
+                assert_eq!(expected, (first + count).min(records));
             }
+            assert!(Spool::<[u32; 2]>::open(&scratch, &state).is_err());
         }
-        assert_eq!(expected, 29_000);
-        assert!(Spool::<[u32; 4]>::open(&scratch, "spool").is_err());
+    }
+
+    #[test]
+    fn every_byte_that_lies_is_found() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let state = written(&scratch, 20_000).state().clone();
+        let path = scratch.path("spool");
+        let whole = std::fs::read(&path).expect("the file is there");
+        let read_all = || -> Result<(), StoreError> {
+            let spool = Spool::<[u32; 4]>::open(&scratch, &state)?;
+            let mut records = Vec::new();
+            // Small ranges, in an odd order.
+            for first in (0..20_000).rev().step_by(100) {
+                spool.read(first, 100, &mut records)?;
+            }
+            Ok(())
+        };
+        read_all().expect("all is well");
+        for at in (0..whole.len()).step_by(997).chain(0..40).chain(whole.len() - 48..whole.len()) {
+            let file = std::fs::OpenOptions::new().write(true).open(&path).expect("there");
+            file.write_all_at(&[whole[at] ^ 16], at as u64).expect("writable");
+            assert!(matches!(read_all(), Err(StoreError::Damaged { .. })), "byte {at}");
+            file.write_all_at(&[whole[at]], at as u64).expect("writable");
+        }
+        for len in [0, 63, 64, 4096, whole.len() - 1] {
+            std::fs::write(&path, &whole[..len]).expect("writable");
+            assert!(matches!(read_all(), Err(StoreError::Damaged { .. })), "cut at {len}");
+        }
     }
 
     #[test]

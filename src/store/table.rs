@@ -1,11 +1,9 @@
 //! A growing array of fixed records: in memory while it fits its share, in cached blocks on disk
 //! beyond. For look-ups by number, such as the vertices of an indexed file.
 
-use std::fs::File;
-
 use bytemuck::Pod;
 
-use crate::store::{Scratch, StoreError};
+use crate::store::{Scratch, ScratchFile, StoreError};
 
 /// An array of records, read and written by index.
 ///
@@ -20,7 +18,7 @@ pub struct Table<R: Pod> {
 }
 
 struct Paged<R> {
-    file: File,
+    file: ScratchFile,
     /// A power of two, and its logarithm.
     block_records: usize,
     block_shift: u32,
@@ -96,7 +94,7 @@ impl<R: Pod> Table<R> {
         match &mut self.paged {
             None => Ok(self.resident[index as usize]),
             Some(paged) => {
-                let (slot, at) = paged.find(&self.scratch, index)?;
+                let (slot, at) = paged.find(index)?;
                 Ok(paged.slots[slot].records[at])
             }
         }
@@ -112,7 +110,7 @@ impl<R: Pod> Table<R> {
         match &mut self.paged {
             None => self.resident[index as usize] = record,
             Some(paged) => {
-                let (slot, at) = paged.find(&self.scratch, index)?;
+                let (slot, at) = paged.find(index)?;
                 paged.slots[slot].records[at] = record;
                 paged.slots[slot].dirty = true;
             }
@@ -123,7 +121,7 @@ impl<R: Pod> Table<R> {
     /// Moves all records to disk and goes on with cached blocks.
     fn page_out(&mut self) -> Result<(), StoreError> {
         let file = self.scratch.anonymous("table")?;
-        self.scratch.write_at(&file, bytemuck::cast_slice(&self.resident), 0)?;
+        file.write_at(bytemuck::cast_slice(&self.resident), 0)?;
         self.resident = Vec::new();
         let block_bytes = (self.share_bytes / 8).clamp(4096, 64 << 10);
         let block_shift = (block_bytes / size_of::<R>()).max(1).ilog2();
@@ -146,7 +144,7 @@ impl<R: Pod> Table<R> {
 impl<R: Pod> Paged<R> {
     /// Slot and place in it of a record, after loading its block.
     #[inline]
-    fn find(&mut self, scratch: &Scratch, index: u64) -> Result<(usize, usize), StoreError> {
+    fn find(&mut self, index: u64) -> Result<(usize, usize), StoreError> {
         let block = index >> self.block_shift;
         let at = index as usize & (self.block_records - 1);
         if self.last.0 == block {
@@ -154,7 +152,7 @@ impl<R: Pod> Paged<R> {
         }
         let slot = match self.slot_of_block.get(block as usize) {
             Some(&slot) if slot != NO_SLOT => slot as usize,
-            _ => self.load(scratch, block)?,
+            _ => self.load(block)?,
         };
         self.slots[slot].used = true;
         self.last = (block, slot);
@@ -163,7 +161,7 @@ impl<R: Pod> Paged<R> {
 
     /// Reads a block into a free or evicted slot (second chance).
     #[cold]
-    fn load(&mut self, scratch: &Scratch, block: u64) -> Result<usize, StoreError> {
+    fn load(&mut self, block: u64) -> Result<usize, StoreError> {
         let slot = if self.slots.len() < self.slot_count {
             let records = vec![R::zeroed(); self.block_records];
             self.slots.push(Slot { block: NO_BLOCK, records, dirty: false, used: false });
@@ -180,13 +178,13 @@ impl<R: Pod> Paged<R> {
         let block_bytes = (self.block_records * size_of::<R>()) as u64;
         if victim.dirty {
             let bytes: &[u8] = bytemuck::cast_slice(&victim.records);
-            scratch.write_at(&self.file, bytes, victim.block * block_bytes)?;
+            self.file.write_at(bytes, victim.block * block_bytes)?;
         }
         if victim.block != NO_BLOCK {
             self.slot_of_block[victim.block as usize] = NO_SLOT;
         }
         victim.records.fill(R::zeroed());
-        read_up_to(scratch, &self.file, &mut victim.records, block * block_bytes)?;
+        read_up_to(&self.file, &mut victim.records, block * block_bytes)?;
         victim.block = block;
         victim.dirty = false;
         if self.slot_of_block.len() <= block as usize {
@@ -200,15 +198,14 @@ impl<R: Pod> Paged<R> {
 
 /// Reads what the file holds from `offset` on; the rest stays zero (the file ends in mid-block).
 fn read_up_to<R: Pod>(
-    scratch: &Scratch,
-    file: &File,
+    file: &ScratchFile,
     records: &mut [R],
     offset: u64,
 ) -> Result<(), StoreError> {
-    let end = file.metadata().map_err(|e| StoreError::io("read from", scratch.folder(), e))?.len();
+    let end = file.len_bytes()?;
     let bytes: &mut [u8] = bytemuck::cast_slice_mut(records);
     let there = end.saturating_sub(offset).min(bytes.len() as u64) as usize;
-    scratch.read_at(file, &mut bytes[..there], offset)
+    file.read_at(&mut bytes[..there], offset)
 }
 
 #[cfg(test)]

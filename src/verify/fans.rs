@@ -8,12 +8,10 @@
 //!             externally, and a vertex too large even for that is united externally.
 //! Fails:      only as [`StoreError`].
 
-use std::fs::File;
-
 use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::Monitor;
-use crate::store::{Record, Scratch, StoreError};
+use crate::store::{Record, Scratch, ScratchFile, StoreError};
 use crate::verify::crowd::judge_by_sorting;
 use crate::verify::link::{Judgement, Wedge};
 use crate::verify::spool::Spool;
@@ -117,8 +115,7 @@ fn judge_range(
 
 /// Corners in one file, in blocks of one range each.
 struct Ranges {
-    scratch: Scratch,
-    file: File,
+    file: ScratchFile,
     width: u64,
     block_corners: usize,
     lists: Vec<BlockList>,
@@ -149,7 +146,7 @@ impl Ranges {
         let width = space.div_ceil(count).max(1);
         let lists = (0..space.div_ceil(width)).map(|_| BlockList::default()).collect();
         let file = scratch.anonymous("fans")?;
-        let mut ranges = Self { scratch: scratch.clone(), file, width, block_corners, lists };
+        let mut ranges = Self { file, width, block_corners, lists };
         let mut end = 0;
         tape.each_whole(monitor, |ids| {
             corners_of(ids).into_iter().try_for_each(|corner| ranges.push(corner, &mut end))
@@ -161,7 +158,7 @@ impl Ranges {
         let list = &mut self.lists[(u64::from(corner.vertex) / self.width) as usize];
         if list.open.len() == self.block_corners {
             let bytes: &[u8] = bytemuck::cast_slice(&list.open);
-            self.scratch.write_at(&self.file, bytes, *end)?;
+            self.file.write_at(bytes, *end)?;
             list.blocks.push(*end);
             *end += bytes.len() as u64;
             list.open.clear();
@@ -186,7 +183,7 @@ impl Ranges {
             if monitor.cancelled() {
                 return Err(StoreError::Cancelled);
             }
-            self.scratch.read_at(&self.file, bytemuck::cast_slice_mut(&mut block), offset)?;
+            self.file.read_at(bytemuck::cast_slice_mut(&mut block), offset)?;
             block.iter().copied().for_each(&mut *see);
         }
         list.open.iter().copied().for_each(see);

@@ -2,11 +2,9 @@
 //!
 //! Memory: `share_bytes`; beyond that the records lie in a scratch file.
 
-use std::fs::File;
-
 use bytemuck::Pod;
 
-use crate::store::{Scratch, StoreError};
+use crate::store::{Scratch, ScratchFile, StoreError};
 
 /// Bytes that a spool on disk keeps back before it writes.
 const BLOCK_BYTES: usize = 64 << 10;
@@ -16,7 +14,7 @@ pub(crate) struct Spool<R: Pod> {
     scratch: Scratch,
     share_bytes: usize,
     resident: Vec<R>,
-    file: Option<File>,
+    file: Option<ScratchFile>,
     written: u64,
 }
 
@@ -70,7 +68,7 @@ impl<R: Pod> Spool<R> {
         }
         let file = self.file.as_ref().expect("the file was opened above");
         let offset = self.written * size_of::<R>() as u64;
-        self.scratch.write_at(file, bytemuck::cast_slice(&self.resident), offset)?;
+        file.write_at(bytemuck::cast_slice(&self.resident), offset)?;
         self.written += self.resident.len() as u64;
         self.resident.clear();
         Ok(())
@@ -95,7 +93,7 @@ impl<R: Pod> Spool<R> {
             let there = (self.written - start).min(count as u64) as usize;
             buffer.resize(there, R::zeroed());
             let offset = start * size_of::<R>() as u64;
-            self.scratch.read_at(file, bytemuck::cast_slice_mut(buffer), offset)?;
+            file.read_at(bytemuck::cast_slice_mut(buffer), offset)?;
             return Ok(buffer);
         }
         let from = ((start - self.written) as usize).min(self.resident.len());

@@ -17,7 +17,7 @@ use crate::octree::{
     ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS, SIDE,
     SourcePlane, decode_signs, edge_position, encode,
 };
-use crate::store::{BrickFile, BrickWriter, Resources, StoreError, ordered};
+use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered};
 
 /// A vertex keeps this many lattice units from the walls of its cell.
 const INSET_UNITS: i64 = 2;
@@ -38,11 +38,10 @@ pub fn place_vertices(
     options: &ContourOptions,
     resources: &Resources,
 ) -> Result<(BrickFile, ContourStats), ContourError> {
-    let mut writer = BrickWriter::create(resources.scratch, CELLS, resources.backing)?;
-    let mut stats = ContourStats::default();
-    let mut numbers = 0..signs.len();
+    let mut pass = BrickPass::<ContourStats>::start(CELLS, resources)?;
+    let mut numbers = pass.items() as usize..signs.len();
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    ordered(
+    let placed = ordered(
         resources.pool,
         || {
             if resources.monitor.cancelled() {
@@ -56,16 +55,13 @@ pub fn place_vertices(
             space.place(signs, number)
         },
         |placed: Placed| {
-            stats.cells += placed.stats.cells;
-            stats.multi_cells += placed.stats.multi_cells;
-            stats.flipped_faces += placed.stats.flipped_faces;
-            stats.cell_vertices += placed.stats.cell_vertices;
-            stats.clamped_vertices += placed.stats.clamped_vertices;
-            resources.monitor.advance(1);
-            Ok(writer.append(placed.key, 0, &placed.bytes)?)
+            pass.counts.add(&placed.stats);
+            // The flags of the directory say how many vertices come from each brick.
+            pass.append(placed.key, placed.stats.cell_vertices as u32, &placed.bytes)?;
+            Ok(pass.item_done()?)
         },
-    )?;
-    Ok((writer.finish(resources.cached_windows)?, stats))
+    );
+    pass.end(placed, ContourError::is_stop)
 }
 
 /// A crossing as the cells around it need it.

@@ -8,7 +8,8 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
 use crate::io::output::Output;
-use crate::mesh::{MeshSink, SinkStats};
+use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats};
+use crate::store::Scratch;
 
 /// Writes `v` and `f` lines.
 #[derive(Debug)]
@@ -20,10 +21,20 @@ pub(crate) struct ObjWriter {
 }
 
 impl ObjWriter {
-    pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
-        let mut output = Output::create(path)?;
+    pub(crate) fn create(path: &Path, scratch: &Scratch) -> Result<Self, IoError> {
+        let mut output = Output::create(path, scratch)?;
         output.write(b"# brickmend\n")?;
         Ok(Self { output, text: Vec::new(), vertices: 0, triangles: 0 })
+    }
+
+    /// Goes on where an earlier writer was.
+    pub(crate) fn reopen(
+        path: &Path,
+        scratch: &Scratch,
+        state: &SinkState,
+    ) -> Result<Self, IoError> {
+        let output = Output::reopen(path, scratch, &state.output)?;
+        Ok(Self { output, text: Vec::new(), vertices: state.vertices, triangles: state.triangles })
     }
 }
 
@@ -68,9 +79,18 @@ impl MeshSink for ObjWriter {
         Ok(())
     }
 
+    fn bytes_so_far(&self) -> u64 {
+        self.output.bytes()
+    }
+
+    fn checkpoint(&mut self) -> Result<SinkState, IoError> {
+        let (output, aside) = (self.output.state()?, SinkFile::default());
+        Ok(SinkState { vertices: self.vertices, triangles: self.triangles, output, aside })
+    }
+
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
         let Self { output, vertices, triangles, .. } = *self;
-        let bytes = output.finish()?;
-        Ok(SinkStats { vertices, triangles, bytes })
+        let file = output.finish()?;
+        Ok(SinkStats { vertices, triangles, file })
     }
 }

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::io::error::IoError;
 use crate::io::output::{Aside, Output};
-use crate::mesh::{MeshSink, SinkStats};
+use crate::mesh::{MeshSink, SinkState, SinkStats};
 use crate::store::Scratch;
 
 /// Room for any two counts.
@@ -26,10 +26,22 @@ pub(crate) struct PlyWriter {
 
 impl PlyWriter {
     pub(crate) fn create(path: &Path, scratch: &Scratch) -> Result<Self, IoError> {
-        let faces = Aside::new(scratch)?;
-        let mut output = Output::create(path)?;
+        let faces = Aside::create(scratch)?;
+        let mut output = Output::create(path, scratch)?;
         output.write(&header(0, 0))?;
         Ok(Self { output, faces, vertices: 0, triangles: 0 })
+    }
+
+    /// Goes on where an earlier writer was.
+    pub(crate) fn reopen(
+        path: &Path,
+        scratch: &Scratch,
+        state: &SinkState,
+    ) -> Result<Self, IoError> {
+        let output = Output::reopen(path, scratch, &state.output)?;
+        let faces = Aside::reopen(scratch, &state.aside)?;
+        let SinkState { vertices, triangles, .. } = *state;
+        Ok(Self { output, faces, vertices, triangles })
     }
 }
 
@@ -68,12 +80,21 @@ impl MeshSink for PlyWriter {
         Ok(())
     }
 
+    fn bytes_so_far(&self) -> u64 {
+        self.output.bytes() + self.faces.bytes()
+    }
+
+    fn checkpoint(&mut self) -> Result<SinkState, IoError> {
+        let (output, aside) = (self.output.state()?, self.faces.state()?);
+        Ok(SinkState { vertices: self.vertices, triangles: self.triangles, output, aside })
+    }
+
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
         let Self { mut output, faces, vertices, triangles } = *self;
         output.append(faces)?;
         output.patch(&header(vertices, triangles), 0)?;
-        let bytes = output.finish()?;
-        Ok(SinkStats { vertices, triangles, bytes })
+        let file = output.finish()?;
+        Ok(SinkStats { vertices, triangles, file })
     }
 }
 

@@ -7,7 +7,8 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::output::Output;
 use crate::io::stl::binary::{FACET_BYTES, HEADER_BYTES};
-use crate::mesh::{MeshSink, SinkStats};
+use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats};
+use crate::store::Scratch;
 
 /// Must not begin with `solid`, or readers take the file for text.
 const TITLE: &[u8] = b"brickmend: binary STL, little endian";
@@ -21,12 +22,22 @@ pub(crate) struct StlWriter {
 }
 
 impl StlWriter {
-    pub(crate) fn create(path: &Path) -> Result<Self, IoError> {
-        let mut output = Output::create(path)?;
+    pub(crate) fn create(path: &Path, scratch: &Scratch) -> Result<Self, IoError> {
+        let mut output = Output::create(path, scratch)?;
         let mut header = [0; HEADER_BYTES];
         header[..TITLE.len()].copy_from_slice(TITLE);
         output.write(&header)?;
         Ok(Self { output, vertices: 0, facets: 0 })
+    }
+
+    /// Goes on where an earlier writer was.
+    pub(crate) fn reopen(
+        path: &Path,
+        scratch: &Scratch,
+        state: &SinkState,
+    ) -> Result<Self, IoError> {
+        let output = Output::reopen(path, scratch, &state.output)?;
+        Ok(Self { output, vertices: state.vertices, facets: state.triangles })
     }
 }
 
@@ -51,11 +62,20 @@ impl MeshSink for StlWriter {
         corners.iter().try_for_each(|corners| self.output.write(&facet(corners)))
     }
 
+    fn bytes_so_far(&self) -> u64 {
+        self.output.bytes()
+    }
+
+    fn checkpoint(&mut self) -> Result<SinkState, IoError> {
+        let (output, aside) = (self.output.state()?, SinkFile::default());
+        Ok(SinkState { vertices: self.vertices, triangles: self.facets, output, aside })
+    }
+
     fn finish(mut self: Box<Self>) -> Result<SinkStats, IoError> {
         let count = u32::try_from(self.facets).expect("checked when they were added");
         self.output.patch(&count.to_le_bytes(), 80)?;
-        let bytes = self.output.finish()?;
-        Ok(SinkStats { vertices: self.vertices, triangles: self.facets, bytes })
+        let file = self.output.finish()?;
+        Ok(SinkStats { vertices: self.vertices, triangles: self.facets, file })
     }
 }
 
@@ -97,7 +117,9 @@ mod tests {
     #[test]
     fn more_facets_than_the_count_can_hold_are_refused() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut writer = StlWriter::create(&folder.path().join("a.stl")).expect("creates");
+        let mut writer =
+            StlWriter::create(&folder.path().join("a.stl"), &Scratch::new(folder.path()))
+                .expect("creates");
         writer.facets = u64::from(u32::MAX) - 1;
         writer.triangles(&[[0; 3]], &[[[0.0; 3]; 3]]).expect("the last one fits");
         let refused = writer.triangles(&[[0; 3]], &[[[0.0; 3]; 3]]);

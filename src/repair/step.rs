@@ -1,0 +1,175 @@
+//! The steps of a run, what each leaves in the work folder, and who reads it.
+//!
+//! A step is what a checkpoint can say of: it is finished, and its files are there. A stage that
+//! takes long is made of several.
+
+use crate::contour::CELLS;
+use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, SOUP};
+use crate::monitor::Stage;
+use crate::octree::FLIPS;
+use crate::scan::HITS;
+use crate::sign::{FLOODED, REGIONS, SHEETS, SIGNS};
+
+/// The output while it is written.
+pub const OUTPUT_PART: &str = "output.part";
+
+/// A step, in running order.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub enum Step {
+    /// The input file becomes a spool of triangles.
+    Read,
+    /// Triangles go into the bins of bricks.
+    Bin,
+    /// Copies are settled, rims counted.
+    Settle,
+    /// Bins become bricks of hits.
+    Scan,
+    /// Odd faces become flips.
+    Patch,
+    /// What the outside reaches.
+    Flood,
+    /// Hits and flips become signs.
+    Sign,
+    /// Signs become vertices.
+    Place,
+    /// The surface is written.
+    Write,
+    /// The written file is proved.
+    Prove,
+}
+
+impl Step {
+    /// All steps.
+    pub const ALL: [Self; 10] = [
+        Self::Read,
+        Self::Bin,
+        Self::Settle,
+        Self::Scan,
+        Self::Patch,
+        Self::Flood,
+        Self::Sign,
+        Self::Place,
+        Self::Write,
+        Self::Prove,
+    ];
+
+    /// Its name in the manifest.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Read => "read",
+            Self::Bin => "bin",
+            Self::Settle => "settle",
+            Self::Scan => "scan",
+            Self::Patch => "patch",
+            Self::Flood => "flood",
+            Self::Sign => "sign",
+            Self::Place => "place",
+            Self::Write => "write",
+            Self::Prove => "prove",
+        }
+    }
+
+    /// The stage that it is a part of.
+    pub const fn stage(self) -> Stage {
+        match self {
+            Self::Read | Self::Bin | Self::Settle => Stage::Ingest,
+            Self::Scan => Stage::Scan,
+            Self::Patch => Stage::Patch,
+            Self::Flood | Self::Sign => Stage::Sign,
+            Self::Place | Self::Write => Stage::Contour,
+            Self::Prove => Stage::Verify,
+        }
+    }
+
+    /// The files that it leaves. `attributes.spool` is there only if the input has attributes.
+    pub const fn writes(self) -> &'static [&'static str] {
+        match self {
+            Self::Read => &[SOUP, ATTRIBUTES],
+            Self::Bin => &[BINS, BIN_ENTRIES],
+            Self::Settle => &[DROPS],
+            Self::Scan => &[HITS],
+            Self::Patch => &[FLIPS],
+            Self::Flood => &[FLOODED, REGIONS, SHEETS],
+            Self::Sign => &[SIGNS],
+            Self::Place => &[CELLS],
+            Self::Write => &[OUTPUT_PART],
+            Self::Prove => &[],
+        }
+    }
+
+    /// The files that it cannot do without.
+    pub const fn reads(self) -> &'static [&'static str] {
+        match self {
+            Self::Read => &[],
+            Self::Bin => &[SOUP],
+            Self::Settle => &[BINS, BIN_ENTRIES],
+            Self::Scan => &[BINS, BIN_ENTRIES, DROPS],
+            Self::Patch => &[HITS],
+            Self::Flood => &[HITS, FLIPS],
+            Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, SHEETS],
+            Self::Place => &[SIGNS],
+            Self::Write => &[CELLS],
+            Self::Prove => &[OUTPUT_PART],
+        }
+    }
+
+    /// The step that leaves `file`.
+    pub fn writer_of(file: &str) -> Option<Self> {
+        Self::ALL.into_iter().find(|step| step.writes().contains(&file))
+    }
+
+    /// Whether `file` is still of use once this step is finished: as input of a later step, or to
+    /// do this one again.
+    pub fn still_needs(self, file: &str) -> bool {
+        let last_reader = Self::ALL.into_iter().rfind(|step| step.reads().contains(&file));
+        // Nobody reads attributes yet.
+        last_reader.is_none_or(|reader| reader >= self)
+    }
+
+    /// The step after which all inputs of this one are there, given the files that are.
+    pub fn with_inputs(self, is_there: impl Fn(&str) -> bool) -> Self {
+        let mut first = self;
+        while let Some(writer) = first
+            .reads()
+            .iter()
+            .filter(|file| !is_there(file))
+            .filter_map(|f| Self::writer_of(f))
+            .min()
+        {
+            first = writer;
+        }
+        first
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_input_is_left_by_an_earlier_step() {
+        for step in Step::ALL {
+            for file in step.reads() {
+                assert!(Step::writer_of(file).is_some_and(|writer| writer < step), "{file}");
+            }
+        }
+    }
+
+    #[test]
+    fn inputs_of_a_step_outlive_it_by_one() {
+        assert!(Step::Scan.still_needs(BINS));
+        assert!(!Step::Patch.still_needs(BINS));
+        assert!(Step::Sign.still_needs(HITS));
+        assert!(!Step::Place.still_needs(HITS));
+        assert!(Step::Prove.still_needs(OUTPUT_PART));
+    }
+
+    #[test]
+    fn a_lost_file_is_made_again_from_the_nearest_step_whose_inputs_are_there() {
+        assert_eq!(Step::Sign.with_inputs(|_| true), Step::Sign);
+        assert_eq!(Step::Sign.with_inputs(|file| file != REGIONS), Step::Flood);
+        assert_eq!(Step::Sign.with_inputs(|file| file != REGIONS && file != FLIPS), Step::Patch);
+        assert_eq!(Step::Prove.with_inputs(|file| file == BINS), Step::Read);
+        assert_eq!(Step::Prove.with_inputs(|_| false), Step::Read);
+    }
+}

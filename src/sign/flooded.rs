@@ -1,0 +1,120 @@
+//! What the flood found, as relabelling reads it: brick by brick, region by region.
+//!
+//! In:      the bricks of the region graph, their parities, and what the outside reaches.
+//! Out:     spools that a later run can go on from.
+//! Memory:  a block of each.
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::sign::SignError;
+use crate::sign::graph::{Exterior, GraphBrick};
+use crate::sign::sheets::Sheets;
+use crate::store::{FileState, Resources, Spool, SpoolPeek, SpoolWriter, StoreError};
+
+/// Spool of the bricks.
+pub const FLOODED: &str = "flooded.spool";
+/// Spool of what is known of each region, brick after brick.
+pub const REGIONS: &str = "regions.spool";
+
+/// A brick of the flood. 16 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct FloodedBrick {
+    /// Its key.
+    pub key: u64,
+    /// How many regions it has.
+    pub regions: u32,
+    /// 1 when its min corner is inside by parity, else 0.
+    pub base_inside: u32,
+}
+
+/// In a record of a region: the outside reaches it.
+pub const OUTSIDE: u8 = 1;
+/// In a record of a region: only walls closer than a cell keep the outside away.
+pub const SEALED_BY_RESOLUTION: u8 = 2;
+
+/// What the outside reaches.
+pub struct Flooded {
+    bricks: Spool<FloodedBrick>,
+    regions: Spool<u8>,
+    /// Corners behind open sheets.
+    pub sheets: Sheets,
+}
+
+impl Flooded {
+    /// Writes down what the flood found.
+    pub(crate) fn write(
+        bricks: &[GraphBrick],
+        parities: &[bool],
+        mut exterior: Exterior,
+        sheets: Sheets,
+        resources: &Resources,
+    ) -> Result<Self, SignError> {
+        let mut records = SpoolWriter::create(resources.scratch, FLOODED)?;
+        let mut regions = SpoolWriter::create(resources.scratch, REGIONS)?;
+        for (brick, &inside) in bricks.iter().zip(parities) {
+            let (count, base_inside) = (u32::from(brick.regions), u32::from(inside));
+            records.push(FloodedBrick { key: brick.key, regions: count, base_inside })?;
+            for region in brick.first_region..brick.first_region + count {
+                let outside = exterior.reaches(region)?;
+                let sealed = !outside && exterior.reaches_past_even(region)?;
+                let bits = if outside { OUTSIDE } else { 0 };
+                regions.push(bits | if sealed { SEALED_BY_RESOLUTION } else { 0 })?;
+            }
+        }
+        Ok(Self { bricks: records.finish()?, regions: regions.finish()?, sheets })
+    }
+
+    /// Opens what an earlier run wrote.
+    ///
+    /// # Errors
+    /// A file is missing or damaged.
+    pub fn open(resources: &Resources, files: &[FileState]) -> Result<Self, StoreError> {
+        Ok(Self {
+            bricks: Spool::open(resources.scratch, FileState::find(files, FLOODED)?)?,
+            regions: Spool::open(resources.scratch, FileState::find(files, REGIONS)?)?,
+            sheets: Sheets::open(resources, files)?,
+        })
+    }
+
+    /// The files, as they have to be found again.
+    #[must_use]
+    pub fn files(&self) -> Vec<FileState> {
+        vec![self.bricks.state().clone(), self.regions.state().clone(), self.sheets.state().clone()]
+    }
+
+    /// The number of regions.
+    #[must_use]
+    pub fn region_count(&self) -> u64 {
+        self.regions.len()
+    }
+
+    /// Reads it brick by brick.
+    pub(crate) fn by_brick(&self) -> FloodReader<'_> {
+        FloodReader { bricks: SpoolPeek::new(&self.bricks), regions: &self.regions, next: 0 }
+    }
+}
+
+/// Bricks in order, with what is known of their regions.
+pub(crate) struct FloodReader<'f> {
+    bricks: SpoolPeek<'f, FloodedBrick>,
+    regions: &'f Spool<u8>,
+    next: u64,
+}
+
+impl FloodReader<'_> {
+    /// The next brick.
+    pub fn next(&mut self) -> Result<Option<FloodedBrick>, StoreError> {
+        let brick = self.bricks.next()?;
+        self.next += brick.map_or(0, |brick| u64::from(brick.regions));
+        Ok(brick)
+    }
+
+    /// What is known of the regions of the brick that came last.
+    pub fn regions_of(&self, brick: &FloodedBrick) -> Result<Vec<u8>, StoreError> {
+        let mut regions = Vec::new();
+        let first = self.next - u64::from(brick.regions);
+        self.regions.read(first, brick.regions as usize, &mut regions)?;
+        Ok(regions)
+    }
+}

@@ -1,0 +1,193 @@
+//! Reads the records of a brick file through cached windows; each is checked once.
+
+use std::collections::HashMap;
+use std::ops::Deref;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
+
+use memmap2::Mmap;
+use rkyv::util::AlignedVec;
+
+use crate::store::brick::layout::{
+    DirectoryEntry, MAGIC, WINDOW_BYTES, check_header, read_directory,
+};
+use crate::store::mapped::map;
+use crate::store::{FileState, Scratch, ScratchFile, StoreError, digest};
+
+/// A finished brick file. Shared freely between threads.
+pub struct BrickFile {
+    scratch: Scratch,
+    state: Option<FileState>,
+    directory: Vec<DirectoryEntry>,
+    checked: Vec<AtomicU64>,
+    bytes: Bytes,
+}
+
+pub(crate) enum Bytes {
+    Mapped { file: Box<ScratchFile>, cache: Mutex<WindowCache> },
+    Memory(Vec<Arc<AlignedVec>>),
+}
+
+impl Bytes {
+    pub(crate) fn mapped(file: ScratchFile, capacity: usize) -> Self {
+        let cache = WindowCache { windows: HashMap::new(), clock: 0, capacity: capacity.max(1) };
+        Self::Mapped { file: Box::new(file), cache: Mutex::new(cache) }
+    }
+}
+
+pub(crate) struct WindowCache {
+    windows: HashMap<u64, (Arc<Mmap>, u64)>,
+    clock: u64,
+    capacity: usize,
+}
+
+impl BrickFile {
+    pub(crate) fn new(
+        scratch: Scratch,
+        state: Option<FileState>,
+        directory: Vec<DirectoryEntry>,
+        bytes: Bytes,
+    ) -> Self {
+        let checked = (0..directory.len().div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
+        Self { scratch, state, directory, checked, bytes }
+    }
+
+    /// Opens a brick file that an earlier run finished.
+    ///
+    /// # Errors
+    /// The file or its directory is missing, of another version, or not what `state` says.
+    pub fn open(
+        scratch: &Scratch,
+        state: &FileState,
+        cached_windows: usize,
+    ) -> Result<Self, StoreError> {
+        let directory = read_directory(scratch, state)?;
+        let file = scratch.open(&state.name)?;
+        check_header(&file, MAGIC, WINDOW_BYTES as u32)?;
+        let bytes = Bytes::mapped(file, cached_windows);
+        Ok(Self::new(scratch.clone(), Some(state.clone()), directory, bytes))
+    }
+
+    /// How it is found again; `None` in memory.
+    #[must_use]
+    pub fn state(&self) -> Option<&FileState> {
+        self.state.as_ref()
+    }
+
+    /// The number of records.
+    #[must_use]
+    pub fn len(&self) -> usize {
+        self.directory.len()
+    }
+
+    /// Whether there is no record.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.directory.is_empty()
+    }
+
+    /// Keys, lengths and flags, by ascending key.
+    #[must_use]
+    pub fn directory(&self) -> &[DirectoryEntry] {
+        &self.directory
+    }
+
+    /// The number of the record with `key`.
+    #[must_use]
+    pub fn find(&self, key: u64) -> Option<usize> {
+        self.directory.binary_search_by_key(&key, |entry| entry.key).ok()
+    }
+
+    /// The bytes of record `number`, checked against its hash when touched for the first time.
+    ///
+    /// # Errors
+    /// [`StoreError::Damaged`] when they are not what was written; or the map is refused.
+    pub fn view(&self, number: usize) -> Result<View, StoreError> {
+        let entry = self.directory[number];
+        let view = match &self.bytes {
+            Bytes::Memory(records) => View {
+                holder: Holder::Memory(Arc::clone(&records[number])),
+                at: 0,
+                len: entry.len_bytes as usize,
+            },
+            Bytes::Mapped { file, cache } => {
+                let start = entry.offset / WINDOW_BYTES * WINDOW_BYTES;
+                let at = (entry.offset - start) as usize;
+                let span = (at as u64 + u64::from(entry.len_bytes)).next_multiple_of(WINDOW_BYTES);
+                let map = self.window(file, cache, start, span)?;
+                View { holder: Holder::Mapped(map), at, len: entry.len_bytes as usize }
+            }
+        };
+        self.check(number, &view)?;
+        Ok(view)
+    }
+
+    fn window(
+        &self,
+        file: &ScratchFile,
+        cache: &Mutex<WindowCache>,
+        start: u64,
+        span: u64,
+    ) -> Result<Arc<Mmap>, StoreError> {
+        let mut cache = cache.lock().unwrap_or_else(PoisonError::into_inner);
+        cache.clock += 1;
+        let now = cache.clock;
+        if let Some((map, used)) = cache.windows.get_mut(&start) {
+            *used = now;
+            return Ok(Arc::clone(map));
+        }
+        if cache.windows.len() >= cache.capacity {
+            let oldest = cache.windows.iter().min_by_key(|(_, (_, used))| *used);
+            let oldest = oldest.map(|(start, _)| *start);
+            oldest.and_then(|start| cache.windows.remove(&start));
+        }
+        let mapped = Arc::new(map(file, start, span as usize)?);
+        self.scratch.count_read(span);
+        cache.windows.insert(start, (Arc::clone(&mapped), now));
+        Ok(mapped)
+    }
+
+    fn check(&self, number: usize, bytes: &[u8]) -> Result<(), StoreError> {
+        let bit = 1 << (number % 64);
+        if self.checked[number / 64].load(Ordering::Relaxed) & bit != 0 {
+            return Ok(());
+        }
+        let entry = self.directory[number];
+        let found = digest(bytes);
+        if found != entry.hash {
+            let path = match &self.bytes {
+                Bytes::Mapped { file, .. } => file.path(),
+                Bytes::Memory(_) => self.scratch.folder(),
+            };
+            let expected = format!("digest {:02x?} of brick {:#x}", entry.hash, entry.key);
+            return Err(StoreError::damaged(path, entry.offset, expected, format!("{found:02x?}")));
+        }
+        self.checked[number / 64].fetch_or(bit, Ordering::Relaxed);
+        Ok(())
+    }
+}
+
+/// The bytes of one record; keeps its window mapped.
+#[derive(Clone)]
+pub struct View {
+    holder: Holder,
+    at: usize,
+    len: usize,
+}
+
+#[derive(Clone)]
+enum Holder {
+    Mapped(Arc<Mmap>),
+    Memory(Arc<AlignedVec>),
+}
+
+impl Deref for View {
+    type Target = [u8];
+    fn deref(&self) -> &[u8] {
+        let all: &[u8] = match &self.holder {
+            Holder::Mapped(map) => map,
+            Holder::Memory(record) => record,
+        };
+        &all[self.at..self.at + self.len]
+    }
+}
