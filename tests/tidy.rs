@@ -33,9 +33,10 @@ const STAGE: u32 = 4;
 const VERIFY_IMPORTS: [&str; 6] = ["geom", "mesh", "io", "store", "defect", "monitor"];
 
 /// Words of third-party crates, and the only files (or folders, ending in /) that may have them.
-const HOMES: [(&str, &[&str]); 14] = [
-    ("memmap2::", &["store/mapped.rs", "store/brick_file.rs"]),
-    ("unsafe ", &["store/mapped.rs"]),
+const HOMES: [(&str, &[&str]); 15] = [
+    ("memmap2::", &["store/mapped.rs", "store/brick/"]),
+    ("unsafe ", &["store/mapped.rs", "cli/signals.rs", "cli/allocator.rs"]),
+    ("signal_hook::", &["cli/signals.rs", "cli/last_words.rs"]),
     ("indicatif::", &["cli/progress.rs"]),
     ("tobj::", &["io/obj/"]),
     ("exr::", &["report/image_exr.rs", "report/preview/tests.rs"]),
@@ -43,14 +44,15 @@ const HOMES: [(&str, &[&str]); 14] = [
     ("clap::", &["cli/"]),
     ("anyhow::", &["cli/"]),
     ("crossbeam::", &["store/pipeline.rs"]),
-    ("blake3::", &["store/", "repair/stages.rs"]),
-    ("rustix::", &["store/mapped.rs", "io/input.rs"]),
+    ("blake3::", &["store/", "repair/run.rs"]),
+    ("rustix::", &["store/", "io/input.rs", "cli/last_words.rs"]),
     ("robust::", &["geom/", "verify/"]),
     (
         "rkyv::",
         &[
             "store/manifest.rs",
-            "store/brick_file.rs",
+            "store/checkpoint.rs",
+            "store/brick/",
             "octree/brick.rs",
             // These hand on the aligned bytes that `encode` returns.
             "scan/mod.rs",
