@@ -150,7 +150,11 @@ impl RepairError {
         match self {
             Self::Input(error) if error.is_input() => Blame::Input,
             Self::Input(IoError::Store(error)) => blame_store(error),
-            Self::Output(IoError::Store(error)) => blame_store(error),
+            Self::Output(IoError::Store(error)) | Self::ReadBack(IoError::Store(error)) => {
+                blame_store(error)
+            }
+            // The file is ours: it is the disk that cannot give it back.
+            Self::ReadBack(IoError::Input { .. }) => Blame::Disk,
             Self::Input(_) | Self::Output(_) => Blame::Disk,
             Self::NoTriangle { .. } | Self::Broken { .. } => Blame::Input,
             Self::InputChanged { .. } => Blame::Temporary,

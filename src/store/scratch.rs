@@ -126,7 +126,7 @@ impl Scratch {
     /// A file that is there, to be read and gone on with. It counts already.
     ///
     /// # Errors
-    /// The file cannot be opened.
+    /// [`StoreError::Damaged`] when it is gone; or it cannot be opened.
     pub fn open(&self, name: &str) -> Result<ScratchFile, StoreError> {
         self.open_at(&self.path(name))
     }
@@ -137,7 +137,10 @@ impl Scratch {
     /// The file cannot be opened.
     pub fn open_at(&self, path: &Path) -> Result<ScratchFile, StoreError> {
         let opened = OpenOptions::new().read(true).write(true).open(path);
-        let file = opened.map_err(|e| StoreError::io("open", path, e))?;
+        let file = opened.map_err(|e| match e.kind() {
+            ErrorKind::NotFound => StoreError::damaged(path, 0, "a file", "none"),
+            _ => StoreError::io("open", path, e),
+        })?;
         let len = file.metadata().map_err(|e| StoreError::io("stat", path, e))?.len();
         Ok(ScratchFile::named(file, path.to_path_buf(), self.clone(), len))
     }

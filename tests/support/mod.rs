@@ -3,6 +3,8 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 pub mod breakage;
+pub mod image;
+pub mod program;
 pub mod run;
 pub mod soups;
 pub mod surface;
