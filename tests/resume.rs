@@ -99,36 +99,40 @@ fn files_of(image: &Place) -> Vec<std::path::PathBuf> {
     files
 }
 
-/// A way to damage bytes.
-type Lie = fn(&mut Vec<u8>, &mut Random);
+/// A way to damage bytes; how many of them are left.
+type Lie = fn(&mut [u8], &mut Random) -> usize;
 
-fn flip_a_bit(bytes: &mut Vec<u8>, random: &mut Random) {
+fn flip_a_bit(bytes: &mut [u8], random: &mut Random) -> usize {
     let at = random.below(bytes.len());
     bytes[at] ^= 1 << random.below(8);
+    bytes.len()
 }
 
-fn cut_off(bytes: &mut Vec<u8>, random: &mut Random) {
-    bytes.truncate(random.below(bytes.len()));
+fn cut_off(bytes: &mut [u8], random: &mut Random) -> usize {
+    random.below(bytes.len())
 }
 
-fn zero_a_page(bytes: &mut Vec<u8>, random: &mut Random) {
+fn zero_a_page(bytes: &mut [u8], random: &mut Random) -> usize {
     let page = random.below(bytes.len().div_ceil(4096));
     let end = bytes.len().min((page + 1) * 4096);
     bytes[page * 4096..end].fill(0);
+    bytes.len()
 }
 
-fn swap_two_stretches(bytes: &mut Vec<u8>, random: &mut Random) {
+fn swap_two_stretches(bytes: &mut [u8], random: &mut Random) -> usize {
     let half = bytes.len() / 2;
     let length = 1 + random.below(half.clamp(1, 2000));
     for i in 0..length.min(half) {
         bytes.swap(i, half + i);
     }
+    bytes.len()
 }
 
-fn another_version(bytes: &mut Vec<u8>, _: &mut Random) {
+fn another_version(bytes: &mut [u8], _: &mut Random) -> usize {
     if let Some(version) = bytes.get_mut(8) {
         *version ^= 0x40;
     }
+    bytes.len()
 }
 
 const LIES: [Lie; 5] = [flip_a_bit, cut_off, zero_a_page, swap_two_stretches, another_version];
@@ -139,7 +143,8 @@ fn assert_lie_is_found(filmed: &Filmed, image: &Place, file: &Path, lie: Lie, ra
     copy_folder(&image.work_folder(), &copy.work_folder());
     let target = copy.work_folder().join(file.file_name().expect("a name"));
     let mut bytes = std::fs::read(&target).expect("readable");
-    lie(&mut bytes, random);
+    let left = lie(&mut bytes, random);
+    bytes.truncate(left);
     std::fs::write(&target, &bytes).expect("writable");
     let result = copy.repair(&filmed.input, &filmed.settings, &filmed.limits, &Void);
     let outcome = result.unwrap_or_else(|error| panic!("{}: {error}", target.display()));

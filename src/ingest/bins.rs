@@ -109,6 +109,9 @@ fn write_bins(sorter: Sorter<BinTriangle>, resources: &Resources) -> Result<Bins
         match &mut open {
             Some(entry) if entry.brick == binned.brick => entry.count += 1,
             _ => {
+                if resources.monitor.cancelled() {
+                    return Err(StoreError::Cancelled);
+                }
                 let first = triangles.len();
                 let entry = BinEntry { brick: binned.brick, first, count: 1 };
                 open.replace(entry).map_or(Ok(()), |done| entries.push(done))?;

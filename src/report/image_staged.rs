@@ -21,16 +21,19 @@ impl StagedFile {
     /// Creates the file beside `target`.
     pub(crate) fn create<E: std::error::Error>(target: &Path) -> Result<Self, PreviewError<E>> {
         let mut name: OsString = target.file_name().unwrap_or_default().to_os_string();
-        // The process in the name keeps two runs with the same target apart.
-        name.push(format!(".{}.partial", std::process::id()));
+        // One name for all runs: what a killed one left is written over by the next.
+        name.push(".partial");
         let partial = target.with_file_name(name);
-        let file = File::options()
-            .read(true)
-            .write(true)
-            .create(true)
-            .truncate(true)
-            .open(&partial)
-            .map_err(|source| PreviewError::io("create", &partial, source))?;
+        let mut options = File::options();
+        options.read(true).write(true).create(true).truncate(false);
+        let create = || -> io::Result<File> {
+            let file = options.open(&partial)?;
+            // Two runs with one target: the second does not write into the first one's file.
+            file.try_lock()?;
+            file.set_len(0)?;
+            Ok(file)
+        };
+        let file = create().map_err(|source| PreviewError::io("create", &partial, source))?;
         Ok(Self { target: target.to_path_buf(), partial, file })
     }
 

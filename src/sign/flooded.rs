@@ -53,6 +53,9 @@ impl Flooded {
         let mut records = SpoolWriter::create(resources.scratch, FLOODED)?;
         let mut regions = SpoolWriter::create(resources.scratch, REGIONS)?;
         for (brick, &inside) in bricks.iter().zip(parities) {
+            if resources.monitor.cancelled() {
+                return Err(StoreError::Cancelled.into());
+            }
             let (count, base_inside) = (u32::from(brick.regions), u32::from(inside));
             records.push(FloodedBrick { key: brick.key, regions: count, base_inside })?;
             for region in brick.first_region..brick.first_region + count {

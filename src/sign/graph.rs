@@ -5,7 +5,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::monitor::{Gauge, Resident};
+use crate::monitor::{Gauge, Monitor, Resident};
 use crate::octree::{
     BrickIndex, BrickKey, FaceRegions, Flips, Neighbour, Regions, edge_position, find_regions,
 };
@@ -213,7 +213,7 @@ impl RegionGraph {
         };
         let none = Sorter::new(resources.scratch, 0);
         let pieces = std::mem::replace(&mut self.pieces, none);
-        join_pieces(pieces, index, first_empty, outside, &mut join)?;
+        join_pieces(pieces, index, first_empty, outside, &mut join, resources.monitor)?;
         index.for_each_empty_contact(|empty, other| {
             let other = other.map_or(outside, |other| first_empty + other as u32);
             join(first_empty + empty as u32, other)
@@ -238,11 +238,16 @@ fn join_pieces(
     first_empty: u32,
     outside: u32,
     join: &mut impl FnMut(u32, u32) -> Result<(), StoreError>,
+    monitor: &dyn Monitor,
 ) -> Result<(), SignError> {
     let mut sorted = pieces.finish()?;
     let mut waiting: Option<FacePiece> = None;
     loop {
         let next = sorted.next()?;
+        if waiting.map(|piece| piece.upper) != next.map(|piece| piece.upper) && monitor.cancelled()
+        {
+            return Err(StoreError::Cancelled.into());
+        }
         if let Some(first) = waiting.take() {
             let same = |other: &FacePiece| {
                 (other.upper, other.axis, other.piece) == (first.upper, first.axis, first.piece)
