@@ -12,6 +12,9 @@
 //! Guaranteed of every file that is put in place: closed, edge- and vertex-manifold, outward
 //! oriented, free of degenerate triangles, proved on the file as written.
 //!
+//! A run that was stopped or killed goes on from its last checkpoint when it is started again, and
+//! ends with the same bytes; what lies on the disk is checked before it is believed.
+//!
 //! Refused: input that cannot be parsed, input in which no triangle is left, memory budgets below
 //! the floor, output grids too coarse for the depth. `ARCHITECTURE.md` shows the rooms and their
 //! invariants.

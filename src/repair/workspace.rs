@@ -28,9 +28,10 @@ use crate::store::{
 /// Ending of work folders.
 const ENDING: &str = "brickmend";
 const MANIFEST: &str = "manifest";
-/// Files that live within one step, and those on the way to a name.
-const PASSING: [&str; 6] =
-    ["manifest.new", "facts.spool", "faces.spool", "even.spool", FACES, MANIFEST];
+/// Files that live within one step.
+const PASSING: [&str; 4] = ["facts.spool", "faces.spool", "even.spool", FACES];
+/// The manifest on its way to its name.
+const MANIFEST_NEW: &str = "manifest.new";
 
 /// A locked work folder.
 pub struct Workspace {
@@ -218,7 +219,8 @@ impl Workspace {
             save_manifest(&self.folder.join(MANIFEST), &manifest)?;
         }
         drop(manifest);
-        spent.iter().try_for_each(|file| self.remove_file(&file.name))
+        let spent = spent.iter().map(|file| file.name.as_str());
+        spent.chain(PASSING).try_for_each(|name| self.remove_file(name))
     }
 
     /// Where the running step begins and notes its progress.
@@ -348,7 +350,8 @@ fn go_back(manifest: &mut Manifest, step: Step) {
 
 /// Every name that a file of ours may have, besides directories and the lock.
 fn all_names() -> impl Iterator<Item = &'static str> {
-    Step::ALL.into_iter().flat_map(Step::writes).copied().chain(PASSING)
+    let files = Step::ALL.into_iter().flat_map(Step::writes).copied();
+    files.chain(PASSING).chain([MANIFEST, MANIFEST_NEW])
 }
 
 fn parent_of(path: &Path) -> &Path {

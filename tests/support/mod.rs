@@ -8,6 +8,7 @@ pub mod program;
 pub mod run;
 pub mod soups;
 pub mod surface;
+pub mod targets;
 
 use std::path::{Path, PathBuf};
 
