@@ -25,8 +25,21 @@ fn corpus(name: &str) -> Vec<Vec<u8>> {
 
 /// Words that readers take notice of.
 const WORDS: [&[u8]; 16] = [
-    b"4294967295", b"-1", b"1e308", b"nan", b"\n", b"\\\n", b"f 1 2 3\n", b"v ", b"element ",
-    b"property list ", b"end_header\n", b"solid", b"OFF", b"\xff\xff\xff\xff", b"\0\0\0\0",
+    b"4294967295",
+    b"-1",
+    b"1e308",
+    b"nan",
+    b"\n",
+    b"\\\n",
+    b"f 1 2 3\n",
+    b"v ",
+    b"element ",
+    b"property list ",
+    b"end_header\n",
+    b"solid",
+    b"OFF",
+    b"\xff\xff\xff\xff",
+    b"\0\0\0\0",
     b"\x1f\x8b\x08",
 ];
 

@@ -14,6 +14,7 @@ mod plan;
 mod run;
 mod settings;
 mod stages;
+mod standing;
 mod step;
 mod workspace;
 

@@ -19,6 +19,9 @@ use crate::monitor::Monitor;
 use crate::repair::RepairError;
 use crate::repair::lock::{LOCK, lock_folder};
 use crate::repair::settings::Limits;
+use crate::repair::standing::{
+    MANIFEST, PASSING, all_names, go_back, is_listed, next_step, written,
+};
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::store::{
     Backing, Checkpoints, FileState, Manifest, Progress, Scratch, StoreError, directory_name,
@@ -27,11 +30,6 @@ use crate::store::{
 
 /// Ending of work folders.
 const ENDING: &str = "brickmend";
-const MANIFEST: &str = "manifest";
-/// Files that live within one step.
-const PASSING: [&str; 4] = ["facts.spool", "faces.spool", "even.spool", FACES];
-/// The manifest on its way to its name.
-const MANIFEST_NEW: &str = "manifest.new";
 
 /// A locked work folder.
 pub struct Workspace {
@@ -97,15 +95,7 @@ impl Workspace {
             }
         }
         self.sweep_nameless()?;
-        let is_listed = |name: &str| {
-            let in_progress = manifest.progress.iter().flat_map(|progress| &progress.files);
-            manifest.files.iter().chain(in_progress).any(|file| file.name == name)
-                // The sink's files are told of by its own state.
-                || manifest.progress.is_some()
-                    && next_step(&manifest) == Some(Step::Write)
-                    && (name == OUTPUT_PART || name == FACES)
-        };
-        let listed: Vec<&str> = all_names().filter(|name| is_listed(name)).collect();
+        let listed: Vec<&str> = all_names().filter(|name| is_listed(&manifest, name)).collect();
         for name in all_names().filter(|name| !listed.contains(name) && *name != MANIFEST) {
             self.remove_file(name)?;
         }
@@ -329,29 +319,6 @@ impl Checkpoints for StepCheckpoints<'_> {
         self.monitor.checkpoint(self.step.name(), items);
         Ok(())
     }
-}
-
-fn next_step(manifest: &Manifest) -> Option<Step> {
-    Step::ALL.into_iter().find(|step| !manifest.steps.iter().any(|name| name == step.name()))
-}
-
-fn written(manifest: &Manifest) -> Option<SinkFile> {
-    let file = manifest.files.iter().find(|file| file.name == OUTPUT_PART)?;
-    Some(SinkFile { bytes: file.len_bytes, digest: file.root })
-}
-
-/// Forgets `step` and all that came after it.
-fn go_back(manifest: &mut Manifest, step: Step) {
-    let is_kept = |name: &str| Step::ALL.into_iter().any(|s| s < step && s.name() == name);
-    manifest.steps.retain(|name| is_kept(name));
-    manifest.files.retain(|file| Step::writer_of(&file.name).is_some_and(|writer| writer < step));
-    manifest.progress = None;
-}
-
-/// Every name that a file of ours may have, besides directories and the lock.
-fn all_names() -> impl Iterator<Item = &'static str> {
-    let files = Step::ALL.into_iter().flat_map(Step::writes).copied();
-    files.chain(PASSING).chain([MANIFEST, MANIFEST_NEW])
 }
 
 fn parent_of(path: &Path) -> &Path {
