@@ -1,0 +1,63 @@
+//! Contouring: leaf cells per second, of placing vertices, of joining them, and of writing PLY.
+
+mod support;
+
+use brickmend::contour::{ContourOptions, ContourStats, Method, write_surface};
+use brickmend::io::{Format, create};
+use brickmend::mesh::MeshSink;
+use brickmend::octree::Domain;
+use brickmend::store::{BrickFile, Resources};
+use criterion::{Criterion, Throughput, criterion_group, criterion_main};
+use std::hint::black_box;
+
+use crate::support::{Nowhere, Workshop, shapes};
+
+const DEPTH: u32 = 8;
+const OPTIONS: ContourOptions = ContourOptions { method: Method::Mdc, crease_deg: 12.0 };
+
+fn write<S: MeshSink + ?Sized>(
+    cells: &BrickFile,
+    domain: &Domain,
+    sink: &mut S,
+    resources: &Resources,
+) -> ContourStats
+where
+    S::Error: Send,
+{
+    let mut stats = ContourStats::default();
+    write_surface(cells, domain, &OPTIONS, sink, &mut stats, resources).expect("contour works");
+    stats
+}
+
+fn contours(criterion: &mut Criterion) {
+    let mut group = criterion.benchmark_group("contour");
+    group.sample_size(10);
+    for (name, shape) in shapes() {
+        let workshop = Workshop::new();
+        let resources = workshop.resources();
+        let model = workshop.ingest(&shape, DEPTH);
+        let (hits, _) = workshop.scan(&model);
+        let flips = workshop.patch(&model, &hits);
+        let (signs, stats) = workshop.sign(&model, &hits, &flips);
+        let (cells, _) = workshop.place(&model, &signs, &OPTIONS);
+        group.throughput(Throughput::Elements(stats.leaf_cells));
+        group.bench_function(format!("{name} vertices"), |bencher| {
+            bencher.iter(|| black_box(workshop.place(&model, &signs, &OPTIONS)));
+        });
+        group.bench_function(format!("{name} polygons"), |bencher| {
+            bencher.iter(|| write(&cells, &model.domain, &mut Nowhere::default(), &resources));
+        });
+        group.bench_function(format!("{name} polygons to PLY"), |bencher| {
+            let path = workshop.folder().join("out.ply");
+            bencher.iter(|| {
+                let sink = create(&path, Format::Ply, resources.scratch);
+                let mut sink = sink.expect("the folder is writable");
+                write(&cells, &model.domain, &mut *sink, &resources)
+            });
+        });
+    }
+    group.finish();
+}
+
+criterion_group!(benches, contours);
+criterion_main!(benches);
