@@ -9,13 +9,13 @@ use brickmend::ingest::{Bins, Settled, fill_bins, read_soup, settle};
 use brickmend::mesh::shapes::{
     Corners, ListedTriangles, Random, gear, rotation, sphere, transform,
 };
-use brickmend::mesh::{MeshSink, SinkStats};
+use brickmend::mesh::{MeshSink, SinkState, SinkStats};
 use brickmend::monitor::Void;
 use brickmend::octree::{BrickKey, Domain, Flips};
 use brickmend::patch::patch;
 use brickmend::scan::{HAS_ODD_FACES, ScanItem, ScanStats, scan};
-use brickmend::sign::{FillRule, SignStats, assign_signs};
-use brickmend::store::{Backing, BrickFile, Resources, Scratch, SpoolPeek};
+use brickmend::sign::{FillRule, SignStats, assign_signs, flood};
+use brickmend::store::{Backing, BrickFile, NoCheckpoints, Resources, Scratch, SpoolPeek};
 use glam::DVec3;
 use rayon::ThreadPool;
 use tempfile::TempDir;
@@ -69,6 +69,7 @@ impl Workshop {
             share_bytes: 512 << 20,
             cached_windows: CACHED_WINDOWS,
             backing: Backing::Mapped,
+            checkpoints: &NoCheckpoints,
             monitor: &Void,
         }
     }
@@ -77,10 +78,10 @@ impl Workshop {
         let resources = self.resources();
         let mut source = ListedTriangles::without_indices(triangles.to_vec());
         let soup = read_soup(&mut source, false, &resources).expect("ingest works");
-        let domain = Domain::around(&soup.bounds, depth, false).expect("room enough");
+        let domain = Domain::around(&soup.facts.bounds, depth, false).expect("room enough");
         let (bins, _) = fill_bins(&soup, &domain, &resources).expect("ingest works");
         let settled =
-            settle(&bins, &domain, soup.stats.triangles, &resources).expect("ingest works");
+            settle(&bins, &domain, soup.facts.stats.triangles, &resources).expect("ingest works");
         Ingested { domain, bins, settled }
     }
 
@@ -108,8 +109,9 @@ impl Workshop {
         hits: &BrickFile,
         flips: &Flips,
     ) -> (BrickFile, SignStats) {
-        assign_signs(hits, flips, FillRule::Solid, &model.domain, &self.resources())
-            .expect("sign works")
+        let resources = self.resources();
+        let flooded = flood(hits, flips, &model.domain, &resources).expect("sign works");
+        assign_signs(hits, flips, &flooded, FillRule::Solid, &resources).expect("sign works")
     }
 
     pub fn place(
@@ -143,6 +145,14 @@ impl MeshSink for Nowhere {
     fn triangles(&mut self, indices: &[[u32; 3]], _: &[Corners]) -> Result<(), Infallible> {
         self.stats.triangles += indices.len() as u64;
         Ok(())
+    }
+
+    fn bytes_so_far(&self) -> u64 {
+        0
+    }
+
+    fn checkpoint(&mut self) -> Result<SinkState, Infallible> {
+        Ok(SinkState::default())
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, Infallible> {
