@@ -33,11 +33,13 @@ const STAGE: u32 = 4;
 const VERIFY_IMPORTS: [&str; 6] = ["geom", "mesh", "io", "store", "defect", "monitor"];
 
 /// Words of third-party crates, and the only files (or folders, ending in /) that may have them.
-const HOMES: [(&str, &[&str]); 14] = [
+const HOMES: [(&str, &[&str]); 16] = [
     ("memmap2::", &["store/mapped.rs", "store/brick_file.rs"]),
     ("unsafe ", &["store/mapped.rs"]),
     ("indicatif::", &["cli/progress.rs"]),
     ("tobj::", &["io/obj/"]),
+    ("flate2::", &["io/packed/gzip.rs", "io/packed/tests.rs"]),
+    ("zstd::", &["io/packed/zstandard.rs", "io/packed/tests.rs"]),
     ("exr::", &["report/image_exr.rs", "report/preview/tests.rs"]),
     ("png::", &["report/image_png.rs", "report/preview/tests.rs"]),
     ("clap::", &["cli/"]),

@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
 use crate::store::{Resources, Spool, SpoolWriter, StoreError};
@@ -45,10 +45,10 @@ pub struct Soup {
     pub spool: Spool<SoupTriangle>,
     /// Their box; empty when there is none.
     pub bounds: SnapBox,
-    /// Part names.
-    pub parts: Vec<Part>,
-    /// Materials.
-    pub materials: Vec<Material>,
+    /// Parts that have triangles.
+    pub parts: u64,
+    /// Materials that have triangles.
+    pub materials: u64,
     /// Whether `attributes.spool` was written.
     pub has_attributes: bool,
     /// Counts.
@@ -75,7 +75,7 @@ pub fn read_soup<S: MeshSource + ?Sized>(
         if resources.monitor.cancelled() {
             return Err(StoreError::Cancelled.into());
         }
-        writer.take(&batch, source.materials())?;
+        writer.take(&batch, source)?;
         if writer.delivered > u64::from(u32::MAX) {
             return Err(IngestError::TooManyTriangles { limit: u32::MAX.into() });
         }
@@ -97,8 +97,8 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     Ok(Soup {
         spool: writer.spool.finish()?,
         bounds: writer.bounds,
-        parts: source.parts().to_vec(),
-        materials: source.materials().to_vec(),
+        parts: source.part_count(),
+        materials: source.material_count(),
         has_attributes,
         stats,
     })
@@ -110,6 +110,8 @@ struct Writer<'r> {
     attributes: Option<SpoolWriter<AttributeRecord>>,
     bounds: SnapBox,
     delivered: u64,
+    /// The last material that was asked for, and its number as triangles have it.
+    last_material: Option<(u32, u32)>,
 }
 
 impl<'r> Writer<'r> {
@@ -120,10 +122,15 @@ impl<'r> Writer<'r> {
             attributes: None,
             bounds: SnapBox::EMPTY,
             delivered: 0,
+            last_material: None,
         })
     }
 
-    fn take(&mut self, batch: &TriangleBatch, materials: &[Material]) -> Result<(), StoreError> {
+    fn take<S: MeshSource + ?Sized>(
+        &mut self,
+        batch: &TriangleBatch,
+        source: &mut S,
+    ) -> Result<(), IngestError<S::Error>> {
         let with_attributes = !batch.uvs.is_empty() || !batch.colours.is_empty();
         if with_attributes && self.attributes.is_none() {
             self.attributes = Some(SpoolWriter::create(self.resources.scratch, ATTRIBUTES)?);
@@ -136,18 +143,35 @@ impl<'r> Writer<'r> {
                     polygon: batch.polygons[i],
                 })?;
             }
-            let source = self.delivered as u32;
+            let number = self.delivered as u32;
             self.delivered += 1;
             if !corners.iter().flatten().all(|c| c.is_finite()) {
                 continue;
             }
             corners.iter().for_each(|&corner| self.bounds.add(corner));
-            let material = batch.materials[i];
-            let transparent = materials.get(material as usize).is_some_and(|m| m.transparent);
-            let material = material | if transparent { TRANSPARENT } else { 0 };
+            let material = self.marked_material(batch.materials[i], source)?;
             let part = batch.parts[i];
-            self.spool.push(SoupTriangle { corners: *corners, source, part, material, tags: 0 })?;
+            let triangle =
+                SoupTriangle { corners: *corners, source: number, part, material, tags: 0 };
+            self.spool.push(triangle)?;
         }
         Ok(())
+    }
+
+    /// A material's number, with a bit that says whether it is transparent.
+    fn marked_material<S: MeshSource + ?Sized>(
+        &mut self,
+        number: u32,
+        source: &mut S,
+    ) -> Result<u32, IngestError<S::Error>> {
+        match self.last_material {
+            Some((last, marked)) if last == number => Ok(marked),
+            _ => {
+                let material = source.material(number).map_err(IngestError::Source)?;
+                let marked = number | if material.transparent { TRANSPARENT } else { 0 };
+                self.last_material = Some((number, marked));
+                Ok(marked)
+            }
+        }
     }
 }

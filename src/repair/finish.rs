@@ -50,8 +50,8 @@ pub fn conclude(run: &Run, results: Results) -> Outcome {
         input: SoupReport {
             path: run.input.to_path_buf(),
             stats: soup.stats,
-            parts: soup.parts.len(),
-            materials: soup.materials.len(),
+            parts: soup.parts,
+            materials: soup.materials,
             bounds: soup.bounds,
             measure: findings.measure,
         },

@@ -37,9 +37,9 @@ pub struct SoupReport {
     #[serde(flatten)]
     pub stats: SoupStats,
     /// Number of parts and materials named in the file.
-    pub parts: usize,
+    pub parts: u64,
     /// See `parts`.
-    pub materials: usize,
+    pub materials: u64,
     /// Box of the finite triangles, model units.
     pub bounds: SnapBox,
     /// Area and signed volume.

@@ -5,6 +5,7 @@
 
 mod accountant;
 mod brick_file;
+mod dictionary;
 mod error;
 mod manifest;
 mod mapped;
@@ -18,6 +19,7 @@ mod unite;
 
 pub use accountant::{Accountant, Lease};
 pub use brick_file::{Backing, BrickFile, BrickWriter, DirectoryEntry, View};
+pub use dictionary::{Dictionary, MOST_NAMES};
 pub use error::StoreError;
 pub use manifest::{Manifest, ManifestFile, load_manifest, save_manifest};
 pub use pipeline::ordered;
