@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
-use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
 use crate::store::{FileState, Resources, Spool, SpoolWriter, StoreError};
@@ -108,7 +108,7 @@ pub fn read_soup<S: MeshSource + ?Sized>(
         if resources.monitor.cancelled() {
             return Err(StoreError::Cancelled.into());
         }
-        writer.take(&batch, source.materials())?;
+        writer.take(&batch, source)?;
         if writer.delivered > u64::from(u32::MAX) {
             return Err(IngestError::TooManyTriangles { limit: u32::MAX.into() });
         }
@@ -125,7 +125,7 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     if strict && found > 0 {
         return Err(IngestError::Broken { found });
     }
-    let (parts, materials) = (source.parts().len() as u64, source.materials().len() as u64);
+    let (parts, materials) = (source.part_count(), source.material_count());
     Ok(Soup {
         spool: writer.spool.finish()?,
         attributes: writer.attributes.map(SpoolWriter::finish).transpose()?,
@@ -139,6 +139,8 @@ struct Writer<'r> {
     attributes: Option<SpoolWriter<AttributeRecord>>,
     bounds: SnapBox,
     delivered: u64,
+    /// The last material that was asked for, and its number as triangles have it.
+    last_material: Option<(u32, u32)>,
 }
 
 impl<'r> Writer<'r> {
@@ -149,10 +151,15 @@ impl<'r> Writer<'r> {
             attributes: None,
             bounds: SnapBox::EMPTY,
             delivered: 0,
+            last_material: None,
         })
     }
 
-    fn take(&mut self, batch: &TriangleBatch, materials: &[Material]) -> Result<(), StoreError> {
+    fn take<S: MeshSource + ?Sized>(
+        &mut self,
+        batch: &TriangleBatch,
+        source: &mut S,
+    ) -> Result<(), IngestError<S::Error>> {
         let with_attributes = !batch.uvs.is_empty() || !batch.colours.is_empty();
         if with_attributes && self.attributes.is_none() {
             self.attributes = Some(SpoolWriter::create(self.resources.scratch, ATTRIBUTES)?);
@@ -165,18 +172,35 @@ impl<'r> Writer<'r> {
                     polygon: batch.polygons[i],
                 })?;
             }
-            let source = self.delivered as u32;
+            let number = self.delivered as u32;
             self.delivered += 1;
             if !corners.iter().flatten().all(|c| c.is_finite()) {
                 continue;
             }
             corners.iter().for_each(|&corner| self.bounds.add(corner));
-            let material = batch.materials[i];
-            let transparent = materials.get(material as usize).is_some_and(|m| m.transparent);
-            let material = material | if transparent { TRANSPARENT } else { 0 };
+            let material = self.marked_material(batch.materials[i], source)?;
             let part = batch.parts[i];
-            self.spool.push(SoupTriangle { corners: *corners, source, part, material, tags: 0 })?;
+            let triangle =
+                SoupTriangle { corners: *corners, source: number, part, material, tags: 0 };
+            self.spool.push(triangle)?;
         }
         Ok(())
+    }
+
+    /// A material's number, with a bit that says whether it is transparent.
+    fn marked_material<S: MeshSource + ?Sized>(
+        &mut self,
+        number: u32,
+        source: &mut S,
+    ) -> Result<u32, IngestError<S::Error>> {
+        match self.last_material {
+            Some((last, marked)) if last == number => Ok(marked),
+            _ => {
+                let material = source.material(number).map_err(IngestError::Source)?;
+                let marked = number | if material.transparent { TRANSPARENT } else { 0 };
+                self.last_material = Some((number, marked));
+                Ok(marked)
+            }
+        }
     }
 }

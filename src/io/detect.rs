@@ -6,9 +6,11 @@ use crate::io::Format;
 use crate::io::error::{IoError, Place, shown};
 use crate::io::input::Input;
 use crate::io::off::is_off_keyword;
-use crate::io::stl::{HEADER_BYTES, facets_by_size};
+use crate::io::packed::{Packing, Unpacker, content_name};
+use crate::io::stl::{facets_by_size, may_be_facets};
+use crate::store::Scratch;
 
-/// How much of a file is looked at.
+/// How much of the content is looked at.
 const HEAD_BYTES: usize = 8 << 10;
 
 /// Statements that OBJ files begin with.
@@ -17,13 +19,58 @@ const OBJ_KEYWORDS: [&[u8]; 12] =
 
 /// The format of a file, told by its content first and its extension second.
 ///
+/// Of a packed file only the head is unpacked: what is refused here is no model, but where the head
+/// is binary the whole content may still turn out to be none.
+///
 /// # Errors
 /// The file cannot be opened, is of a format that is not read yet, or of none that is known.
 pub fn detect(path: &Path) -> Result<Format, IoError> {
     let mut input = Input::open(path, 0)?;
+    match Packing::of(input.look_ahead(HEAD_BYTES)?) {
+        Some(packing) => format_of_head(&Unpacker::new(input, packing)?),
+        None => format_of(&mut input),
+    }
+}
+
+/// Opens a file, unpacks it if it is packed, and tells its format.
+///
+/// # Errors
+/// As for [`detect`]; or the packed stream is broken, or the scratch folder fails.
+pub(crate) fn open_model(
+    path: &Path,
+    scratch: &Scratch,
+    share_bytes: u64,
+) -> Result<(Input, Format), IoError> {
+    let mut input = Input::open(path, share_bytes)?;
+    if let Some(packing) = Packing::of(input.look_ahead(HEAD_BYTES)?) {
+        let unpacker = Unpacker::new(input, packing)?;
+        format_of_head(&unpacker)?;
+        input = unpacker.unpack(scratch, share_bytes)?;
+    }
+    let format = format_of(&mut input)?;
+    Ok((input, format))
+}
+
+fn format_of_head(unpacker: &Unpacker) -> Result<Format, IoError> {
+    let (path, head) = (unpacker.path(), unpacker.head());
+    judge(path, &content_name(path), &head[..head.len().min(HEAD_BYTES)], unpacker.size_bytes())
+}
+
+fn format_of(input: &mut Input) -> Result<Format, IoError> {
+    let path = input.path().to_path_buf();
+    let name = if input.is_unpacked() { content_name(&path) } else { path.clone() };
     let size_bytes = input.size_bytes();
     let head = input.look_ahead(HEAD_BYTES)?;
-    let head = &head[..head.len().min(HEAD_BYTES)];
+    judge(&path, &name, &head[..head.len().min(HEAD_BYTES)], Some(size_bytes))
+}
+
+/// The format of content that begins with `head` and is called `name`; its size may not be known.
+fn judge(
+    path: &Path,
+    name: &Path,
+    head: &[u8],
+    size_bytes: Option<u64>,
+) -> Result<Format, IoError> {
     let unsupported = |format| Err(IoError::Unsupported { path: path.to_path_buf(), format });
     if head.starts_with(b"glTF") {
         return unsupported("GLB");
@@ -31,17 +78,32 @@ pub fn detect(path: &Path) -> Result<Format, IoError> {
     if head.starts_with(b"PK\x03\x04") {
         return unsupported("3MF");
     }
+    let refused = |found: String| {
+        Err(IoError::unreadable(path, Place::Byte(0), "an OBJ, STL, PLY or OFF file", found))
+    };
+    if head.is_empty() {
+        return refused("an empty file".to_owned());
+    }
+    if Packing::of(head).is_some() {
+        return refused("a packed file in a packed file".to_owned());
+    }
     if let Some(format) = by_content(head, size_bytes) {
         return Ok(format);
     }
-    match extension(path).as_deref() {
+    match extension(name).as_deref() {
         Some("glb") => return unsupported("GLB"),
         Some("3mf") => return unsupported("3MF"),
         _ => {}
     }
-    let found = if head.is_empty() { "an empty file".to_owned() } else { shown(head) };
-    let refusal = IoError::unreadable(path, Place::Byte(0), "an OBJ, STL, PLY or OFF file", found);
-    if head.is_empty() { Err(refusal) } else { format_of_extension(path).ok_or(refusal) }
+    match format_of_extension(name) {
+        Some(format) if format == Format::Stl || !is_mostly_zero(head) => Ok(format),
+        _ => refused(shown(head)),
+    }
+}
+
+/// Whether this is no text, whatever its name says; a stray zero byte does no harm.
+fn is_mostly_zero(head: &[u8]) -> bool {
+    2 * head.iter().filter(|&&byte| byte == 0).count() >= head.len()
 }
 
 /// The format that a file name asks for.
@@ -60,13 +122,16 @@ fn extension(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }
 
-fn by_content(head: &[u8], size_bytes: u64) -> Option<Format> {
+fn by_content(head: &[u8], size_bytes: Option<u64>) -> Option<Format> {
     let first_line = head.split(|&b| b == b'\n').next().unwrap_or_default();
     if first_line.trim_ascii_end() == b"ply" {
         return Some(Format::Ply);
     }
-    let counted = head.get(..HEADER_BYTES).and_then(|header| facets_by_size(header, size_bytes));
-    if counted.is_some_and(|header| header.exact) {
+    let is_binary_stl = match size_bytes {
+        Some(size_bytes) => facets_by_size(head, size_bytes).is_some_and(|header| header.exact),
+        None => may_be_facets(head),
+    };
+    if is_binary_stl {
         return Some(Format::Stl);
     }
     if head.contains(&0) {

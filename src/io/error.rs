@@ -10,8 +10,10 @@ use crate::store::StoreError;
 pub enum Place {
     /// Line number, from 1.
     Line(u64),
-    /// Byte offset, from 0.
+    /// Byte offset, from 0; in the content where the file is packed.
     Byte(u64),
+    /// Byte offset in a packed file, from 0.
+    PackedByte(u64),
 }
 
 impl fmt::Display for Place {
@@ -19,6 +21,7 @@ impl fmt::Display for Place {
         match self {
             Self::Line(line) => write!(f, "line {line}"),
             Self::Byte(offset) => write!(f, "byte {offset}"),
+            Self::PackedByte(offset) => write!(f, "byte {offset} of the packed file"),
         }
     }
 }
@@ -65,6 +68,19 @@ pub enum IoError {
         /// The largest number allowed.
         limit: u64,
     },
+    /// A packed file whose content is out of all proportion to its size.
+    #[error(
+        "{path} is refused: its first {read_bytes} bytes unpack to {unpacked_bytes} bytes, more than \
+         any model's would"
+    )]
+    Bomb {
+        /// The packed file.
+        path: PathBuf,
+        /// Bytes that were unpacked.
+        unpacked_bytes: u64,
+        /// Bytes of the packed file that they came from.
+        read_bytes: u64,
+    },
     /// The output's format cannot number that much.
     #[error("{path} cannot hold more than {limit} {what}")]
     TooLarge {
@@ -99,6 +115,7 @@ impl IoError {
             | Self::NotAFile { .. }
             | Self::Unsupported { .. }
             | Self::TooMany { .. }
+            | Self::Bomb { .. }
             | Self::Input { .. } => true,
             Self::TooLarge { .. } | Self::Store(_) => false,
         }

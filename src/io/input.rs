@@ -1,13 +1,16 @@
 //! A file of the user's, read through one buffer of fixed size; never mapped, never held whole.
 //!
-//! Invariant: `available()` is what follows byte `offset()` of the file. Memory: the capacity.
+//! Invariant: `available()` is what follows byte `offset()` of the content. Memory: the capacity.
 
-use std::fs::{File, Metadata};
-use std::io::{ErrorKind, Read, Seek, SeekFrom};
-use std::os::unix::fs::FileTypeExt;
+use std::fs::{File, Metadata, OpenOptions};
+use std::io::ErrorKind;
+use std::os::unix::fs::{FileExt, FileTypeExt, OpenOptionsExt};
 use std::path::{Path, PathBuf};
 
+use rustix::fs::OFlags;
+
 use crate::io::error::{IoError, Place};
+use crate::store::ScratchFile;
 
 /// The largest input buffer in bytes.
 const LARGEST_BUFFER_BYTES: u64 = 512 << 10;
@@ -18,7 +21,7 @@ const SMALLEST_BUFFER_BYTES: u64 = 16 << 10;
 #[derive(Debug)]
 pub(crate) struct Input {
     path: PathBuf,
-    file: File,
+    content: Content,
     size_bytes: u64,
     buffer: Vec<u8>,
     at: usize,
@@ -31,30 +34,60 @@ pub(crate) struct Input {
     start_offset: u64,
 }
 
+/// Where the bytes come from.
+#[derive(Debug)]
+enum Content {
+    /// The user's file.
+    File(File),
+    /// What a packed file of the user's holds.
+    Unpacked { file: ScratchFile, packed_bytes: u64 },
+}
+
 impl Input {
     /// Opens a regular file and takes a part of `share_bytes` as its buffer.
     pub(crate) fn open(path: &Path, share_bytes: u64) -> Result<Self, IoError> {
-        let file = open_regular(path)?;
-        let metadata = file.metadata().map_err(|e| IoError::input("open", path, e))?;
+        let (file, metadata) = open_regular(path)?;
+        Ok(Self::over(path, Content::File(file), metadata.len(), share_bytes))
+    }
+
+    /// The content of the packed file at `path`: `size_bytes` in a scratch file, from
+    /// `packed_bytes` of the user's.
+    pub(crate) fn unpacked(
+        path: &Path,
+        file: ScratchFile,
+        (size_bytes, packed_bytes): (u64, u64),
+        share_bytes: u64,
+    ) -> Self {
+        let content = Content::Unpacked { file, packed_bytes };
+        Self::over(path, content, size_bytes, share_bytes)
+    }
+
+    fn over(path: &Path, content: Content, size_bytes: u64, share_bytes: u64) -> Self {
         let capacity = (share_bytes / 8).clamp(SMALLEST_BUFFER_BYTES, LARGEST_BUFFER_BYTES);
-        Ok(Self {
+        Self {
             path: path.to_path_buf(),
-            file,
-            size_bytes: metadata.len(),
+            content,
+            size_bytes,
             buffer: vec![0; capacity as usize],
             at: 0,
             end: 0,
             end_offset: 0,
             earlier_bytes: 0,
             start_offset: 0,
-        })
+        }
     }
 
+    /// The user's path, also where the content was unpacked.
     pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 
-    /// The size of the file when it was opened.
+    /// Whether this is the content of a packed file.
+    pub(crate) fn is_unpacked(&self) -> bool {
+        matches!(self.content, Content::Unpacked { .. })
+    }
+
+    /// The size of the content when it was opened.
     pub(crate) fn size_bytes(&self) -> u64 {
         self.size_bytes
     }
@@ -64,8 +97,15 @@ impl Input {
         self.end_offset - (self.end - self.at) as u64
     }
 
-    /// Bytes consumed in all passes.
+    /// Bytes of the user's file that were consumed, in all passes.
     pub(crate) fn bytes_read(&self) -> u64 {
+        match &self.content {
+            Content::File(_) => self.consumed(),
+            Content::Unpacked { packed_bytes, .. } => *packed_bytes,
+        }
+    }
+
+    fn consumed(&self) -> u64 {
         self.earlier_bytes + (self.offset() - self.start_offset)
     }
 
@@ -98,17 +138,20 @@ impl Input {
         if self.end == self.buffer.len() {
             return Ok(false);
         }
-        loop {
-            match self.file.read(&mut self.buffer[self.end..]) {
-                Ok(count) => {
-                    self.end += count;
-                    self.end_offset += count as u64;
-                    return Ok(count > 0);
-                }
-                Err(e) if e.kind() == ErrorKind::Interrupted => {}
-                Err(e) => return Err(IoError::input("read", &self.path, e)),
+        let room = &mut self.buffer[self.end..];
+        let count = match &self.content {
+            Content::File(file) => read_at(file, room, self.end_offset)
+                .map_err(|e| IoError::input("read", &self.path, e))?,
+            Content::Unpacked { file, .. } => {
+                let left = self.size_bytes.saturating_sub(self.end_offset);
+                let count = left.min(room.len() as u64) as usize;
+                file.read_at(&mut room[..count], self.end_offset)?;
+                count
             }
-        }
+        };
+        self.end += count;
+        self.end_offset += count as u64;
+        Ok(count > 0)
     }
 
     /// Makes at least `count` bytes available, or as many as the file has left.
@@ -138,19 +181,21 @@ impl Input {
         }
         let target = self.offset() + count;
         let (earlier, start) = (self.earlier_bytes, self.start_offset);
-        self.seek(target)?;
+        self.seek(target);
         (self.earlier_bytes, self.start_offset) = (earlier, start);
         Ok(())
     }
 
-    /// Goes on at another place; what was consumed so far stays counted.
-    pub(crate) fn seek(&mut self, offset: u64) -> Result<(), IoError> {
-        self.earlier_bytes = self.bytes_read();
-        self.file
-            .seek(SeekFrom::Start(offset))
-            .map_err(|e| IoError::input("read", &self.path, e))?;
-        (self.at, self.end, self.end_offset, self.start_offset) = (0, 0, offset, offset);
-        Ok(())
+    /// Goes on at another place of the file; what was consumed so far stays counted.
+    pub(crate) fn seek(&mut self, offset: u64) {
+        self.earlier_bytes = self.consumed();
+        self.start_offset = offset;
+        let buffer_offset = self.end_offset - self.end as u64;
+        if (buffer_offset..=self.end_offset).contains(&offset) {
+            self.at = (offset - buffer_offset) as usize;
+        } else {
+            (self.at, self.end, self.end_offset) = (0, 0, offset);
+        }
     }
 
     /// The error of a file that ends too early, at its end.
@@ -160,13 +205,33 @@ impl Input {
     }
 }
 
-/// Opens for reading what is a regular file; pipes and devices are refused before they can block.
-fn open_regular(path: &Path) -> Result<File, IoError> {
-    let metadata = std::fs::metadata(path).map_err(|e| IoError::input("open", path, e))?;
-    if let Some(found) = kind_of(&metadata) {
-        return Err(IoError::NotAFile { path: path.to_path_buf(), found });
+/// Opens for reading what is a regular file. Pipes and devices are refused before they are opened,
+/// and nothing that takes their place meanwhile, or only looks like a file, can block.
+fn open_regular(path: &Path) -> Result<(File, Metadata), IoError> {
+    let failed = |e| IoError::input("open", path, e);
+    refuse_others(path, &std::fs::metadata(path).map_err(failed)?)?;
+    let flags = OFlags::NONBLOCK.bits() as i32;
+    let file = OpenOptions::new().read(true).custom_flags(flags).open(path).map_err(failed)?;
+    let metadata = file.metadata().map_err(failed)?;
+    refuse_others(path, &metadata)?;
+    Ok((file, metadata))
+}
+
+fn refuse_others(path: &Path, metadata: &Metadata) -> Result<(), IoError> {
+    match kind_of(metadata) {
+        Some(found) => Err(IoError::NotAFile { path: path.to_path_buf(), found }),
+        None => Ok(()),
     }
-    File::open(path).map_err(|e| IoError::input("open", path, e))
+}
+
+/// Reads some bytes at a place of a file; none at its end.
+fn read_at(file: &File, bytes: &mut [u8], offset: u64) -> std::io::Result<usize> {
+    loop {
+        match file.read_at(bytes, offset) {
+            Err(e) if e.kind() == ErrorKind::Interrupted => {}
+            result => return result,
+        }
+    }
 }
 
 fn kind_of(metadata: &Metadata) -> Option<&'static str> {
@@ -199,7 +264,7 @@ mod tests {
         input.skip(50_000, "x").expect("inside");
         assert_eq!(input.bytes(4, "x").expect("4 bytes"), &content[50_003..50_007]);
         assert_eq!((input.offset(), input.bytes_read()), (50_007, 50_007));
-        input.seek(10).expect("inside");
+        input.seek(10);
         input.skip(20_000, "x").expect("inside");
         assert_eq!((input.offset(), input.bytes_read()), (20_010, 70_007));
         assert!(matches!(

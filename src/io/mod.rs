@@ -19,6 +19,7 @@ mod numbers;
 mod obj;
 mod off;
 mod output;
+mod packed;
 mod ply;
 mod polygon;
 mod stl;
@@ -28,6 +29,7 @@ mod words;
 
 use std::path::Path;
 
+use crate::io::detect::open_model;
 pub use crate::io::detect::{detect, format_of_extension};
 pub use crate::io::error::{IoError, Place};
 use crate::io::obj::{ObjWriter, open_obj};
@@ -93,16 +95,19 @@ pub type Source = Box<dyn MeshSource<Error = IoError> + Send>;
 /// A model file being written.
 pub type Sink = Box<dyn MeshSink<Error = IoError> + Send>;
 
-/// Opens a model file; its content tells the format first, its extension second.
+/// Opens a model file; its content tells the format first, its extension second. A packed file is
+/// unpacked into the scratch folder.
 ///
 /// # Errors
-/// The file is missing, is no regular file, has no known format, or is broken from the start.
+/// The file is missing, is no regular file, has no known format, or is broken from the start; or
+/// the scratch folder fails.
 pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Source, IoError> {
-    Ok(match detect(path)? {
-        Format::Obj => open_obj(path, scratch, options)?,
-        Format::Stl => open_stl(path, options)?,
-        Format::Ply => Box::new(PlyReader::open(path, scratch, options)?),
-        Format::Off => Box::new(OffReader::open(path, scratch, options)?),
+    let (input, format) = open_model(path, scratch, options.share_bytes)?;
+    Ok(match format {
+        Format::Obj => open_obj(input, scratch, options)?,
+        Format::Stl => open_stl(input)?,
+        Format::Ply => Box::new(PlyReader::open(input, scratch, options)?),
+        Format::Off => Box::new(OffReader::open(input, scratch, options)?),
     })
 }
 

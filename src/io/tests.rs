@@ -56,9 +56,9 @@ pub(crate) fn read_all(source: &mut dyn MeshSource<Error = IoError>) -> Result<C
         for optional in [batch.indices.len(), batch.uvs.len(), batch.colours.len()] {
             assert!(optional == 0 || optional == count);
         }
-        assert!(batch.parts.iter().all(|&part| (part as usize) < source.parts().len()));
-        let materials = source.materials().len();
-        assert!(batch.materials.iter().all(|&material| (material as usize) < materials));
+        assert!(batch.parts.iter().all(|&part| u64::from(part) < source.part_count()));
+        let materials = source.material_count();
+        assert!(batch.materials.iter().all(|&material| u64::from(material) < materials));
         content.batch.corners.append(&mut batch.corners);
         content.batch.parts.append(&mut batch.parts);
         content.batch.materials.append(&mut batch.materials);
@@ -67,8 +67,11 @@ pub(crate) fn read_all(source: &mut dyn MeshSource<Error = IoError>) -> Result<C
         content.batch.uvs.append(&mut batch.uvs);
         content.batch.colours.append(&mut batch.colours);
     }
-    content.parts = source.parts().to_vec();
-    content.materials = source.materials().to_vec();
+    content.parts =
+        (0..source.part_count()).map(|i| source.part(i as u32)).collect::<Result<_, _>>()?;
+    content.materials = (0..source.material_count())
+        .map(|i| source.material(i as u32))
+        .collect::<Result<_, _>>()?;
     content.discarded = source.discarded();
     content.vertex_count = source.vertex_count();
     Ok(content)

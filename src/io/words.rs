@@ -49,9 +49,9 @@ impl Words {
     }
 
     /// Goes on at `offset`, which stands in `line`.
-    pub(crate) fn seek(&mut self, offset: u64, line: u64) -> Result<(), IoError> {
+    pub(crate) fn seek(&mut self, offset: u64, line: u64) {
         self.line = line;
-        self.input.seek(offset)
+        self.input.seek(offset);
     }
 
     /// The error that names this line.
@@ -111,6 +111,11 @@ impl Words {
 
     /// The rest of the line, trimmed; bytes that are no UTF-8 are replaced.
     pub(crate) fn name(&mut self) -> Result<String, IoError> {
+        Ok(String::from_utf8_lossy(&self.raw_name()?).into_owned())
+    }
+
+    /// The rest of the line, trimmed, as it stands.
+    pub(crate) fn raw_name(&mut self) -> Result<Vec<u8>, IoError> {
         let mut name = Vec::new();
         loop {
             let bytes = self.input.look_ahead(1)?;
@@ -124,8 +129,7 @@ impl Words {
             }
             name.extend_from_slice(self.input.take(length));
         }
-        let trimmed = name.trim_ascii();
-        Ok(String::from_utf8_lossy(trimmed).into_owned())
+        Ok(name.trim_ascii().to_vec())
     }
 
     /// Goes to the start of the next line; `false` when there is none.

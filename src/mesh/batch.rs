@@ -29,9 +29,9 @@ pub const NO_POLYGON: u32 = u32::MAX;
 pub struct TriangleBatch {
     /// Corner positions in model units; NaN and infinities may occur.
     pub corners: Vec<[[f64; 3]; 3]>,
-    /// Index into [`crate::mesh::MeshSource::parts`].
+    /// Numbers for [`crate::mesh::MeshSource::part`].
     pub parts: Vec<u32>,
-    /// Index into [`crate::mesh::MeshSource::materials`].
+    /// Numbers for [`crate::mesh::MeshSource::material`].
     pub materials: Vec<u32>,
     /// Number of the polygon in the file, counted from 0, that the triangle was cut from.
     pub polygons: Vec<u32>,

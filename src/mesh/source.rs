@@ -15,8 +15,9 @@ pub struct Discarded {
 
 /// A stream of triangles in file order.
 ///
-/// Both name lists may grow while the file is read; an index in a batch is valid once that batch
-/// has been delivered.
+/// Parts and materials are numbered in the order in which triangles use them. Both counts may grow
+/// while the file is read; a number in a batch is valid once that batch has been delivered. Formats
+/// without names have one of each, without a name.
 pub trait MeshSource {
     /// What can go wrong in the world of this source.
     type Error: std::error::Error;
@@ -27,11 +28,31 @@ pub trait MeshSource {
     /// The file cannot be read or ends too early; what was delivered before stays valid.
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, Self::Error>;
 
-    /// The objects seen so far, never empty once a batch was delivered.
-    fn parts(&self) -> &[Part];
+    /// How many parts were seen so far; at least one once a batch was delivered.
+    fn part_count(&self) -> u64 {
+        1
+    }
 
-    /// The materials seen so far, never empty once a batch was delivered.
-    fn materials(&self) -> &[Material];
+    /// How many materials were seen so far; at least one once a batch was delivered.
+    fn material_count(&self) -> u64 {
+        1
+    }
+
+    /// A part by its number, which is below [`MeshSource::part_count`].
+    ///
+    /// # Errors
+    /// Names that did not fit in memory cannot be read back.
+    fn part(&mut self, _number: u32) -> Result<Part, Self::Error> {
+        Ok(Part::default())
+    }
+
+    /// A material by its number, which is below [`MeshSource::material_count`].
+    ///
+    /// # Errors
+    /// As for [`MeshSource::part`].
+    fn material(&mut self, _number: u32) -> Result<Material, Self::Error> {
+        Ok(Material::default())
+    }
 
     /// What was left out so far.
     fn discarded(&self) -> Discarded;

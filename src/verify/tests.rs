@@ -6,7 +6,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use proptest::prelude::*;
 
 use crate::defect::DefectKind;
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Void;
 use crate::store::Scratch;
 use crate::verify::prover::Prover;
@@ -105,12 +105,6 @@ impl MeshSource for Memory<'_> {
         }
         self.next = end;
         Ok(!batch.is_empty())
-    }
-    fn parts(&self) -> &[Part] {
-        &[]
-    }
-    fn materials(&self) -> &[Material] {
-        &[]
     }
     fn discarded(&self) -> Discarded {
         Discarded::default()

@@ -49,9 +49,8 @@ fn read(path: &Path, scratch: &Scratch) {
             Ok(false) => break,
             Err(error) => return assert!(error.is_input(), "{error}"),
         }
-        for &part in &batch.parts {
-            assert!((part as usize) < source.parts().len());
-        }
+        let parts = source.part_count();
+        assert!(batch.parts.iter().all(|&part| u64::from(part) < parts));
         let vertices = source.vertex_count().unwrap_or(u64::MAX);
         assert!(batch.indices.iter().flatten().all(|&index| u64::from(index) < vertices));
     }

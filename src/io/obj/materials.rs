@@ -2,42 +2,51 @@
 //!
 //! Only lines that mean something to us, and that parse, are handed on, one material at a time:
 //! `tobj` refuses a whole file for one bad line, and holds it whole. Libraries that are missing,
-//! lie outside of the folder or cannot be read leave their materials without properties.
-//! Memory: one entry a material, at most [`MOST_DEFINITIONS`].
+//! lie outside of the folder (also by links) or cannot be read leave their materials without
+//! properties. Each is read once. Memory: the share, spilled beyond.
 
-use std::collections::HashMap;
+use std::collections::BTreeSet;
+use std::ffi::OsStr;
+use std::os::unix::ffi::OsStrExt;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Component, Path, PathBuf};
 
 use crate::io::error::IoError;
 use crate::io::input::Input;
-use crate::io::names::Names;
+use crate::io::names::Materials;
 use crate::io::numbers::parse_number;
 use crate::io::words::{Dialect, Words};
 use crate::mesh::Material;
+use crate::store::Scratch;
 
-/// The most materials in the libraries of one file.
-const MOST_DEFINITIONS: usize = 1 << 20;
+/// The most libraries of one file.
+const MOST_LIBRARIES: usize = 4096;
 
 /// What the libraries of a file define, by name.
-#[derive(Debug)]
 pub(crate) struct Library {
     folder: PathBuf,
-    defined: HashMap<String, Material>,
+    /// Device and inode of the files that were read.
+    loaded: BTreeSet<(u64, u64)>,
+    defined: Materials,
 }
 
 impl Library {
     /// Nothing yet; libraries are sought beside `model`.
-    pub(crate) fn new(model: &Path) -> Self {
-        let folder = model.parent().unwrap_or(Path::new("")).to_path_buf();
-        Self { folder, defined: HashMap::new() }
+    pub(crate) fn new(model: &Path, scratch: &Scratch, share_bytes: u64) -> Self {
+        let folder = match model.parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder,
+            _ => Path::new("."),
+        };
+        let defined = Materials::new(scratch, share_bytes);
+        Self { folder: folder.to_path_buf(), loaded: BTreeSet::new(), defined }
     }
 
     /// Reads what `mtllib` names: one file whose name may hold blanks, or several files.
-    pub(crate) fn load(&mut self, names: &str) -> Result<(), IoError> {
+    pub(crate) fn load(&mut self, names: &[u8]) -> Result<(), IoError> {
         if let Some(path) = self.existing(names) {
             return self.load_file(&path);
         }
-        for name in names.split_ascii_whitespace() {
+        for name in names.split(u8::is_ascii_whitespace) {
             if let Some(path) = self.existing(name) {
                 self.load_file(&path)?;
             }
@@ -45,32 +54,48 @@ impl Library {
         Ok(())
     }
 
-    /// The number of a material that a face uses.
+    /// The number of a material that a face of the file at `path` uses.
     pub(crate) fn number(
-        &self,
-        used: &mut Names<Material>,
+        &mut self,
+        used: &mut Materials,
         path: &Path,
         name: &str,
     ) -> Result<u32, IoError> {
-        used.number(path, name, |name| match self.defined.get(&name) {
-            Some(material) => material.clone(),
-            None => Material { name, ..Material::default() },
-        })
+        let before = used.count();
+        let number = used.number(path, name)?;
+        if used.count() > before
+            && let Some(known) = self.defined.find(name)?
+        {
+            used.set(number, &self.defined.get(known)?)?;
+        }
+        Ok(number)
     }
 
     /// The path of a file inside of the model's folder, if it is there.
-    fn existing(&self, name: &str) -> Option<PathBuf> {
-        let name = name.replace('\\', "/");
-        let relative = Path::new(&name);
-        let is_inside = relative
+    fn existing(&self, name: &[u8]) -> Option<PathBuf> {
+        let name: Vec<u8> = name.iter().map(|&b| if b == b'\\' { b'/' } else { b }).collect();
+        let relative = Path::new(OsStr::from_bytes(&name));
+        let stays_inside = relative
             .components()
             .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        let path = self.folder.join(relative);
-        (is_inside && !name.is_empty() && path.is_file()).then_some(path)
+        if !stays_inside || name.is_empty() {
+            return None;
+        }
+        // Links may lead elsewhere: where the file really is counts.
+        let path = self.folder.join(relative).canonicalize().ok()?;
+        let folder = self.folder.canonicalize().ok()?;
+        (path.starts_with(folder) && path.is_file()).then_some(path)
     }
 
     fn load_file(&mut self, path: &Path) -> Result<(), IoError> {
         // A library that cannot be read costs its materials' properties, never the model.
+        let Ok(file) = std::fs::metadata(path) else { return Ok(()) };
+        if !self.loaded.insert((file.dev(), file.ino())) {
+            return Ok(());
+        }
+        if self.loaded.len() > MOST_LIBRARIES {
+            return Err(IoError::too_many(path, "material libraries", MOST_LIBRARIES as u64));
+        }
         let Ok(input) = Input::open(path, 0) else { return Ok(()) };
         let mut words = Words::new(input, Dialect::Comments);
         let mut lines = Lines::default();
@@ -88,9 +113,6 @@ impl Library {
     fn define(&mut self, path: &Path, text: &str) -> Result<(), IoError> {
         let Ok((materials, _)) = tobj::load_mtl_buf(&mut text.as_bytes()) else { return Ok(()) };
         for material in materials {
-            if self.defined.len() >= MOST_DEFINITIONS {
-                return Err(IoError::too_many(path, "materials", MOST_DEFINITIONS as u64));
-            }
             let opaque = material.dissolve.unwrap_or(1.0) >= 1.0;
             let tr = material.unknown_param.get("Tr").and_then(|tr| tr.parse::<f64>().ok());
             let material = Material {
@@ -98,7 +120,8 @@ impl Library {
                 transparent: !opaque || tr.is_some_and(|tr| tr > 0.0),
                 diffuse: material.diffuse.map(|colour| colour.map(|channel| channel as f32)),
             };
-            self.defined.insert(material.name.clone(), material);
+            let number = self.defined.number(path, &material.name)?;
+            self.defined.set(number, &material)?;
         }
         Ok(())
     }

@@ -3,8 +3,9 @@
 //! `tobj` renumbers vertices per model, mixes `o` with `g`, and takes lines for faces. So it gets
 //! positions with their number in the file as a "colour", a first texture coordinate that stands
 //! for missing ones, and an `o` that names all three states for every change of part or material.
-//! What cannot be said so, or does not parse, ends the text: the streaming reader's word stands.
-//! Memory: one statement, and the names and colours of the file.
+//! What cannot be said so, does not parse, or would make `tobj` hold more than [`MOST_HELD_BYTES`]
+//! ends the text: the streaming reader's word stands. Memory: one statement, and the names and
+//! colours of the file, which count towards that limit.
 
 use std::io::{BufRead, Read};
 
@@ -15,6 +16,20 @@ use crate::io::obj::materials::Library;
 use crate::io::obj::statements::{CornerIndices, Statement, Vertex, read_texture, resolve};
 use crate::io::polygon::WHITE;
 use crate::io::words::{Dialect, Words};
+
+/// The most that `tobj` and this text may hold, by the estimates below.
+const MOST_HELD_BYTES: u64 = 24 << 20;
+/// A vertex: position and "colour", in a list of all and in a model, and an index.
+const VERTEX_BYTES: u64 = 136;
+/// A texture coordinate, likewise.
+const TEXTURE_BYTES: u64 = 72;
+/// A face: a record of up to four corners and its arity.
+const FACE_BYTES: u64 = 112;
+/// A corner: its indices in a model, and 24 bytes in a record of more than four.
+const CORNER_BYTES: u64 = 8;
+const MANY_CORNERS_BYTES: u64 = 40;
+/// A change of scope: a model with its lists, and the name besides its bytes.
+const SCOPE_BYTES: u64 = 1024;
 
 /// The names that hold for the faces that follow; numbers into the lists of [`Normalised`].
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -34,7 +49,6 @@ impl Scope {
 }
 
 /// What was seen on the way and does not go through `tobj`.
-#[derive(Debug)]
 pub(crate) struct Seen {
     pub(crate) objects: Vec<String>,
     pub(crate) groups: Vec<String>,
@@ -56,18 +70,17 @@ impl Seen {
 }
 
 /// The text for `tobj`, made while it is read.
-#[derive(Debug)]
 pub(crate) struct Normalised {
     words: Words,
     scope: Scope,
     seen: Seen,
+    held_bytes: u64,
     text: Vec<u8>,
     at: usize,
 }
 
 impl Normalised {
-    pub(crate) fn new(input: Input) -> Self {
-        let library = Library::new(input.path());
+    pub(crate) fn new(input: Input, library: Library) -> Self {
         let unnamed = || vec![String::new()];
         Self {
             words: Words::new(input, Dialect::CommentsAndContinuations),
@@ -83,15 +96,26 @@ impl Normalised {
                 is_obj: false,
                 bytes_read: 0,
             },
+            held_bytes: 0,
             text: b"vt 0 0\no 0 0 0\n".to_vec(),
             at: 0,
         }
     }
 
-    /// What was seen, once `tobj` has read to the end.
-    pub(crate) fn into_seen(mut self) -> Seen {
+    /// What was seen, once `tobj` has read to the end; and the input.
+    pub(crate) fn into_seen(mut self) -> (Seen, Input) {
         self.seen.bytes_read = self.words.input().bytes_read();
-        self.seen
+        (self.seen, self.words.into_input())
+    }
+
+    /// Counts what `tobj` will hold.
+    fn hold(&mut self, bytes: u64) -> Result<(), IoError> {
+        self.held_bytes += bytes;
+        if self.held_bytes > MOST_HELD_BYTES {
+            let path = self.words.input().path();
+            return Err(IoError::too_many(path, "bytes in the hands of tobj", MOST_HELD_BYTES));
+        }
+        Ok(())
     }
 
     /// Replaces the text by the next statement that means something; empty at the file's end.
@@ -107,18 +131,18 @@ impl Normalised {
                 Statement::Face => self.face()?,
                 Statement::Object => {
                     self.scope.object = add_name(&mut self.seen.objects, &mut self.words)?;
-                    self.scope();
+                    self.scope(self.seen.objects[self.scope.object].len())?;
                 }
                 Statement::Group => {
                     self.scope.group = add_name(&mut self.seen.groups, &mut self.words)?;
-                    self.scope();
+                    self.scope(self.seen.groups[self.scope.group].len())?;
                 }
                 Statement::UseMaterial => {
                     self.scope.material = add_name(&mut self.seen.materials, &mut self.words)?;
-                    self.scope();
+                    self.scope(self.seen.materials[self.scope.material].len())?;
                 }
                 Statement::Library => {
-                    let names = self.words.name()?;
+                    let names = self.words.raw_name()?;
                     self.seen.library.load(&names)?;
                 }
                 Statement::Known | Statement::Unknown => {}
@@ -128,12 +152,16 @@ impl Normalised {
         Ok(())
     }
 
-    fn scope(&mut self) {
+    /// Tells `tobj` of a new scope, after a name of so many bytes.
+    fn scope(&mut self, name_bytes: usize) -> Result<(), IoError> {
+        self.hold(SCOPE_BYTES + name_bytes as u64)?;
         let Scope { object, group, material } = self.scope;
         self.text = format!("o {object} {group} {material}\n").into_bytes();
+        Ok(())
     }
 
     fn vertex(&mut self) -> Result<(), IoError> {
+        self.hold(VERTEX_BYTES)?;
         let vertex = Vertex::read(&mut self.words)?;
         if vertex.colour.is_some() && self.seen.colours.is_empty() {
             self.seen.colours.resize(self.seen.vertices as usize, WHITE);
@@ -154,6 +182,7 @@ impl Normalised {
     }
 
     fn texture(&mut self) -> Result<(), IoError> {
+        self.hold(TEXTURE_BYTES)?;
         self.text.extend_from_slice(b"vt");
         for coordinate in read_texture(&mut self.words)? {
             self.text.push(b' ');
@@ -165,8 +194,12 @@ impl Normalised {
     }
 
     fn face(&mut self) -> Result<(), IoError> {
+        self.hold(FACE_BYTES)?;
+        let mut corners = 0;
         self.text.push(b'f');
         while let Some(CornerIndices { vertex, texture }) = CornerIndices::read(&mut self.words)? {
+            corners += 1;
+            self.hold(if corners > 4 { MANY_CORNERS_BYTES } else { CORNER_BYTES })?;
             // Number 1 is the coordinate that stands for missing ones, so all others move up.
             let textures = self.seen.textures;
             let texture = match texture {

@@ -4,13 +4,12 @@
 //! Indices may point forward. Indices that lead nowhere and faces with fewer than three corners are
 //! dropped and counted; a missing texture index gives `[0, 0]`. Statements that mean nothing to us
 //! are passed over; numbers that do not parse end the reading with their line. Memory: half of the
-//! share for positions, an eighth for each of texture coordinates and colours, spilled beyond.
-
-use std::path::Path;
+//! share for positions, an eighth for each of texture coordinates and colours, a 32nd for each list
+//! of names, spilled beyond.
 
 use crate::io::error::IoError;
 use crate::io::input::Input;
-use crate::io::names::Names;
+use crate::io::names::{Materials, Parts};
 use crate::io::obj::materials::Library;
 use crate::io::obj::statements::{CornerIndices, Statement, Vertex, read_texture, resolve};
 use crate::io::polygon::{Columns, Corner, Owner, PolygonCutter, WHITE, polygon_number};
@@ -39,19 +38,17 @@ pub(crate) struct ObjStreamReader {
     faces: u64,
     polygon: PolygonCutter,
     discarded: Discarded,
-    parts: Names<Part>,
-    materials: Names<Material>,
+    parts: Parts,
+    materials: Materials,
 }
 
 impl ObjStreamReader {
-    pub(crate) fn open(
-        path: &Path,
-        scratch: &Scratch,
-        options: &ReadOptions,
-    ) -> Result<Self, IoError> {
+    /// Reads `input` from its start, wherever it stands.
+    pub(crate) fn new(mut input: Input, scratch: &Scratch, options: &ReadOptions) -> Self {
         let share_bytes = options.share_bytes;
-        let input = Input::open(path, share_bytes)?;
-        Ok(Self {
+        let library = Library::new(input.path(), scratch, share_bytes / 32);
+        input.seek(0);
+        Self {
             words: Words::new(input, Dialect::CommentsAndContinuations),
             scratch: scratch.clone(),
             share_bytes,
@@ -60,7 +57,7 @@ impl ObjStreamReader {
             textures: Table::new(scratch, share_bytes / 8),
             colours: None,
             has_objects: false,
-            library: Library::new(path),
+            library,
             vertices_so_far: 0,
             textures_so_far: 0,
             part_name: String::new(),
@@ -69,9 +66,9 @@ impl ObjStreamReader {
             faces: 0,
             polygon: PolygonCutter::default(),
             discarded: Discarded::default(),
-            parts: Names::new(),
-            materials: Names::new(),
-        })
+            parts: Parts::new(scratch, share_bytes / 32),
+            materials: Materials::new(scratch, share_bytes / 32),
+        }
     }
 
     /// The first pass: all vertices, all libraries, and what kind of file this is.
@@ -88,7 +85,7 @@ impl ObjStreamReader {
                 }
                 Statement::Object => self.has_objects = true,
                 Statement::Library => {
-                    let names = self.words.name()?;
+                    let names = self.words.raw_name()?;
                     self.library.load(&names)?;
                 }
                 _ => {}
@@ -105,7 +102,8 @@ impl ObjStreamReader {
             colours: self.colours.is_some(),
         };
         self.polygon = PolygonCutter::new(columns);
-        self.words.seek(0, 1)
+        self.words.seek(0, 1);
+        Ok(())
     }
 
     fn read_vertex(&mut self) -> Result<(), IoError> {
@@ -203,7 +201,7 @@ impl ObjStreamReader {
             return Ok(owner);
         }
         let path = self.words.input().path();
-        let part = self.parts.number(path, &self.part_name, |name| Part { name })?;
+        let part = self.parts.number(path, &self.part_name)?;
         let material = self.library.number(&mut self.materials, path, &self.material_name)?;
         self.owner = Some((part, material));
         Ok((part, material))
@@ -222,12 +220,20 @@ impl MeshSource for ObjStreamReader {
         Ok(!batch.is_empty())
     }
 
-    fn parts(&self) -> &[Part] {
-        self.parts.entries()
+    fn part_count(&self) -> u64 {
+        self.parts.count()
     }
 
-    fn materials(&self) -> &[Material] {
-        self.materials.entries()
+    fn material_count(&self) -> u64 {
+        self.materials.count()
+    }
+
+    fn part(&mut self, number: u32) -> Result<Part, IoError> {
+        self.parts.get(number)
+    }
+
+    fn material(&mut self, number: u32) -> Result<Material, IoError> {
+        self.materials.get(number)
     }
 
     fn discarded(&self) -> Discarded {

@@ -4,8 +4,9 @@ use std::path::Path;
 
 use proptest::prelude::*;
 
+use crate::io::input::Input;
 use crate::io::obj::stream_reader::ObjStreamReader;
-use crate::io::obj::tobj_reader::TobjReader;
+use crate::io::obj::tobj_reader::{Attempt, TobjReader};
 use crate::io::tests::{Content, read_all};
 use crate::io::{IoError, ReadOptions};
 use crate::store::Scratch;
@@ -25,20 +26,24 @@ impl Model {
         std::fs::write(self.folder.path().join(name), content).expect("a file");
     }
 
-    fn by_tobj(&self) -> Option<Content> {
+    fn attempt(&self, largest_bytes: u64) -> Attempt {
         let path = self.folder.path().join("model.obj");
-        let reader = TobjReader::open(&path, u64::MAX).expect("the file is there")?;
-        Some(read_all(&mut { reader }).expect("tobj has read it already"))
+        let input = Input::open(&path, OPTIONS.share_bytes).expect("the file is there");
+        let scratch = Scratch::new(self.folder.path());
+        TobjReader::open(input, largest_bytes, &scratch, &OPTIONS).expect("readable")
+    }
+
+    fn by_tobj(&self) -> Option<Content> {
+        match self.attempt(u64::MAX) {
+            Attempt::Read(mut reader) => {
+                Some(read_all(reader.as_mut()).expect("tobj has read it already"))
+            }
+            Attempt::Declined(_) => None,
+        }
     }
 
     fn by_stream(&self) -> Result<Content, IoError> {
-        let path = self.folder.path().join("model.obj");
-        let scratch = Scratch::new(self.folder.path());
-        read_all(&mut ObjStreamReader::open(
-            &path,
-            &scratch,
-            &ReadOptions { share_bytes: 1 << 20 },
-        )?)
+        by_stream(&self.folder.path().join("model.obj"))
     }
 
     /// What both readers say, which must be the same.
@@ -48,6 +53,14 @@ impl Model {
         stream
     }
 }
+
+fn by_stream(path: &Path) -> Result<Content, IoError> {
+    let scratch = Scratch::new(path.parent().expect("a file in a folder"));
+    let input = Input::open(path, OPTIONS.share_bytes)?;
+    read_all(&mut ObjStreamReader::new(input, &scratch, &OPTIONS))
+}
+
+const OPTIONS: ReadOptions = ReadOptions { share_bytes: 1 << 20 };
 
 const SQUARE: &str = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\n";
 
@@ -192,7 +205,6 @@ fn materials_outside_of_the_folder_are_never_read() {
     std::fs::write(&secret, "newmtl m\nd 0.5\n").expect("a file");
     let folder = outer.path().join("inner");
     std::fs::create_dir(&folder).expect("a folder");
-    let scratch = Scratch::new(outer.path());
     let absolute = secret.to_str().expect("a plain path");
     for (name, seen) in [
         ("../secret.mtl", false),
@@ -204,11 +216,83 @@ fn materials_outside_of_the_folder_are_never_read() {
         std::fs::copy(&secret, folder.join("here.mtl")).expect("a file");
         std::fs::write(&path, format!("mtllib {name}\n{SQUARE}usemtl m\nf 1 2 3\n"))
             .expect("a file");
-        let options = ReadOptions { share_bytes: 1 << 20 };
-        let mut reader = ObjStreamReader::open(&path, &scratch, &options).expect("opens");
-        let content = read_all(&mut reader).expect("readable");
+        let content = by_stream(&path).expect("readable");
         assert_eq!(content.materials[0].transparent, seen, "{name}");
     }
+}
+
+#[test]
+fn links_out_of_the_folder_are_not_followed_and_links_within_it_are() {
+    let outer = tempfile::tempdir().expect("a temporary folder");
+    std::fs::write(outer.path().join("secret.mtl"), "newmtl m\nd 0.5\n").expect("a file");
+    let folder = outer.path().join("inner");
+    std::fs::create_dir(&folder).expect("a folder");
+    std::fs::copy(outer.path().join("secret.mtl"), folder.join("here.mtl")).expect("a file");
+    for (link, target) in
+        [("out.mtl", "../secret.mtl"), ("up", ".."), ("in.mtl", "here.mtl"), ("loop", "loop")]
+    {
+        std::os::unix::fs::symlink(target, folder.join(link)).expect("a link");
+    }
+    for (name, seen) in
+        [("out.mtl", false), ("up/secret.mtl", false), ("loop", false), ("in.mtl", true)]
+    {
+        let path = folder.join("model.obj");
+        std::fs::write(&path, format!("mtllib {name}\n{SQUARE}usemtl m\nf 1 2 3\n"))
+            .expect("a file");
+        let content = by_stream(&path).expect("readable");
+        assert_eq!(content.materials[0].transparent, seen, "{name}");
+    }
+}
+
+#[test]
+fn a_library_is_read_once_by_whatever_names() {
+    let model = Model::new(
+        format!("mtllib a.mtl\nmtllib b.mtl ./a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n").as_bytes(),
+    );
+    model.add("a.mtl", b"newmtl m\nd 0.5\n");
+    model.add("b.mtl", b"newmtl m\nd 1\n");
+    assert!(!model.twins().materials[0].transparent);
+}
+
+#[test]
+fn libraries_are_found_by_names_of_any_bytes() {
+    let model =
+        Model::new(&[b"mtllib K\xfcche.mtl\nusemtl m\n", SQUARE.as_bytes(), b"f 1 2 3\n"].concat());
+    let name = std::os::unix::ffi::OsStrExt::from_bytes(&b"K\xfcche.mtl"[..]);
+    let path = model.folder.path().join::<&std::ffi::OsStr>(name);
+    std::fs::write(path, "newmtl m\nd 0.5\n").expect("a file");
+    assert!(model.twins().materials[0].transparent);
+}
+
+#[test]
+fn what_tobj_would_hold_is_limited_and_the_streaming_reader_goes_on() {
+    let mut many = SQUARE.to_owned();
+    for i in 0..30_000 {
+        many += &format!("o {i}\nf 1 2 3\n");
+    }
+    let model = Model::new(many.as_bytes());
+    assert!(model.by_tobj().is_none());
+    let content = model.by_stream().expect("readable");
+    assert_eq!((content.batch.len(), content.parts.len()), (30_000, 30_000));
+    assert!(
+        Model::new(format!("{SQUARE}{}", "f\n".repeat(300_000)).as_bytes()).by_tobj().is_none()
+    );
+}
+
+#[test]
+fn names_beyond_their_share_are_kept() {
+    let mut obj = SQUARE.to_owned();
+    for i in 0..5_000 {
+        obj += &format!("usemtl {i:0100}\no {i:0300}\nf 1 2 3\n");
+    }
+    let content = by_stream_of(&obj);
+    let expected: Vec<String> = (0..5_000).map(|i| format!("{i:0300}")).collect();
+    assert_eq!(content.part_names(), expected);
+    assert_eq!(content.material_names()[4_321], format!("{:0100}", 4_321));
+}
+
+fn by_stream_of(obj: &str) -> Content {
+    Model::new(obj.as_bytes()).by_stream().expect("readable")
 }
 
 #[test]
@@ -239,10 +323,8 @@ fn only_files_up_to_the_limit_go_to_tobj() {
     let model = Model::new(format!("{SQUARE}f 1 2 3\n").as_bytes());
     let path = model.folder.path().join("model.obj");
     let size = std::fs::metadata(&path).expect("a file").len();
-    let opened = |limit| TobjReader::open(&path, limit).expect("opens").is_some();
-    assert!(opened(size));
-    assert!(!opened(size - 1));
-    assert!(TobjReader::open(Path::new("/nowhere.obj"), 9).is_err());
+    assert!(matches!(model.attempt(size), Attempt::Read(_)));
+    assert!(matches!(model.attempt(size - 1), Attempt::Declined(_)));
 }
 
 fn statement() -> impl Strategy<Value = String> {

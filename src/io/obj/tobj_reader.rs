@@ -1,19 +1,21 @@
 //! Small OBJ files, parsed by `tobj`; the only home of that crate besides the materials.
 //!
 //! Declines whatever `tobj` does not read to the end without an error. Memory: about six times the
-//! size of the file, which is at most what the caller allows.
+//! size of the file, and at most what [`Normalised`] lets through; names in their share.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use tobj::{LoadOptions, Mesh, Model};
 
-use crate::io::BATCH_TRIANGLES;
 use crate::io::error::IoError;
 use crate::io::input::Input;
-use crate::io::names::Names;
+use crate::io::names::{Materials, Parts};
+use crate::io::obj::materials::Library;
 use crate::io::obj::normalised::{Normalised, Scope, Seen};
 use crate::io::polygon::{Columns, Corner, Owner, PolygonCutter, WHITE, polygon_number};
+use crate::io::{BATCH_TRIANGLES, ReadOptions};
 use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::store::Scratch;
 
 /// A file that `tobj` has read, delivered in batches.
 pub(crate) struct TobjReader {
@@ -28,34 +30,48 @@ pub(crate) struct TobjReader {
     faces: u64,
     polygon: PolygonCutter,
     discarded: Discarded,
-    parts: Names<Part>,
-    materials: Names<Material>,
+    parts: Parts,
+    materials: Materials,
+}
+
+/// What became of a file.
+pub(crate) enum Attempt {
+    /// It is read.
+    Read(Box<TobjReader>),
+    /// It is too large or not for `tobj`; the input may have been consumed.
+    Declined(Input),
 }
 
 impl TobjReader {
-    /// Reads the whole file; `None` if it is larger than allowed, or not for `tobj`.
-    pub(crate) fn open(path: &Path, largest_bytes: u64) -> Result<Option<Self>, IoError> {
-        let input = Input::open(path, 0)?;
+    /// Reads the whole file, if it is not larger than allowed.
+    pub(crate) fn open(
+        input: Input,
+        largest_bytes: u64,
+        scratch: &Scratch,
+        options: &ReadOptions,
+    ) -> Result<Attempt, IoError> {
         if input.size_bytes() > largest_bytes {
-            return Ok(None);
+            return Ok(Attempt::Declined(input));
         }
-        let mut text = Normalised::new(input);
-        let options = LoadOptions::default();
-        let loaded = tobj::load_obj_buf(&mut text, &options, |_| Ok(Default::default()));
-        let seen = text.into_seen();
-        let Ok((models, _)) = loaded else { return Ok(None) };
+        let path = input.path().to_path_buf();
+        let names_share = options.share_bytes / 32;
+        let mut text = Normalised::new(input, Library::new(&path, scratch, names_share));
+        let loaded =
+            tobj::load_obj_buf(&mut text, &LoadOptions::default(), |_| Ok(Default::default()));
+        let (seen, input) = text.into_seen();
+        let Ok((models, _)) = loaded else { return Ok(Attempt::Declined(input)) };
         let known = models.iter().all(|model| {
             Scope::parse(&model.name).is_some()
                 && model.mesh.vertex_color.len() == model.mesh.positions.len()
                 && model.mesh.texcoord_indices.len() == model.mesh.indices.len()
         });
         if !known || !seen.is_obj {
-            return Ok(None);
+            return Ok(Attempt::Declined(input));
         }
         let columns =
             Columns { indices: true, uvs: seen.textures > 0, colours: !seen.colours.is_empty() };
-        Ok(Some(Self {
-            path: path.to_path_buf(),
+        Ok(Attempt::Read(Box::new(Self {
+            path,
             seen,
             models: models.into_iter(),
             mesh: Mesh::default(),
@@ -65,9 +81,9 @@ impl TobjReader {
             faces: 0,
             polygon: PolygonCutter::new(columns),
             discarded: Discarded::default(),
-            parts: Names::new(),
-            materials: Names::new(),
-        }))
+            parts: Parts::new(scratch, names_share),
+            materials: Materials::new(scratch, names_share),
+        })))
     }
 
     /// Takes the next face, of this model or of a later one; `false` behind the last.
@@ -111,7 +127,7 @@ impl TobjReader {
         let Scope { object, group, material } = self.scope;
         let has_objects = self.seen.has_objects();
         let name = if has_objects { &self.seen.objects[object] } else { &self.seen.groups[group] };
-        let part = self.parts.number(&self.path, name, |name| Part { name })?;
+        let part = self.parts.number(&self.path, name)?;
         let name = &self.seen.materials[material];
         let material = self.seen.library.number(&mut self.materials, &self.path, name)?;
         Ok((part, material))
@@ -127,12 +143,20 @@ impl MeshSource for TobjReader {
         Ok(!batch.is_empty())
     }
 
-    fn parts(&self) -> &[Part] {
-        self.parts.entries()
+    fn part_count(&self) -> u64 {
+        self.parts.count()
     }
 
-    fn materials(&self) -> &[Material] {
-        self.materials.entries()
+    fn material_count(&self) -> u64 {
+        self.materials.count()
+    }
+
+    fn part(&mut self, number: u32) -> Result<Part, IoError> {
+        self.parts.get(number)
+    }
+
+    fn material(&mut self, number: u32) -> Result<Material, IoError> {
+        self.materials.get(number)
     }
 
     fn discarded(&self) -> Discarded {

@@ -4,14 +4,12 @@
 //! that is glued to the keyword (`OFF490 518 0`) is understood. Four-dimensional and binary
 //! variants are refused. Memory: half of the share for the positions, spilled beyond.
 
-use std::path::Path;
-
 use crate::io::error::{IoError, shown};
 use crate::io::input::Input;
 use crate::io::polygon::{Columns, Corner, Owner, PolygonCutter, checked_index, polygon_number};
 use crate::io::words::{Dialect, Words};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::store::{Scratch, Table};
 
 /// Whether a file that begins with this word is OFF.
@@ -49,17 +47,14 @@ pub(crate) struct OffReader {
     positions: Table<[f64; 3]>,
     polygon: PolygonCutter,
     discarded: Discarded,
-    parts: [Part; 1],
-    materials: [Material; 1],
 }
 
 impl OffReader {
     pub(crate) fn open(
-        path: &Path,
+        input: Input,
         scratch: &Scratch,
         options: &ReadOptions,
     ) -> Result<Self, IoError> {
-        let input = Input::open(path, options.share_bytes)?;
         let mut words = Words::new(input, Dialect::Comments);
         let glued = read_keyword(&mut words)?;
         let vertices = match glued {
@@ -83,8 +78,6 @@ impl OffReader {
             positions: Table::new(scratch, options.share_bytes / 2),
             polygon: PolygonCutter::new(columns),
             discarded: Discarded::default(),
-            parts: Default::default(),
-            materials: Default::default(),
         })
     }
 
@@ -148,14 +141,6 @@ impl MeshSource for OffReader {
         }
         while self.polygon.deliver(batch) && batch.len() < BATCH_TRIANGLES && self.read_face()? {}
         Ok(!batch.is_empty())
-    }
-
-    fn parts(&self) -> &[Part] {
-        &self.parts
-    }
-
-    fn materials(&self) -> &[Material] {
-        &self.materials
     }
 
     fn discarded(&self) -> Discarded {

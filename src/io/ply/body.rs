@@ -60,7 +60,7 @@ impl Body {
     }
 
     /// Goes back to the first element.
-    pub(crate) fn rewind(&mut self) -> Result<(), IoError> {
+    pub(crate) fn rewind(&mut self) {
         match self {
             Self::Text { words, start: (offset, line) } => words.seek(*offset, *line),
             Self::Binary { input, start_offset, .. } => input.seek(*start_offset),

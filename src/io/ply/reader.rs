@@ -5,8 +5,6 @@
 //! numbers that do not parse or are missing end the reading. Memory: half of the share for the
 //! positions, an eighth for the colours, both spilled beyond.
 
-use std::path::Path;
-
 use crate::io::error::IoError;
 use crate::io::input::Input;
 use crate::io::ply::body::Body;
@@ -18,7 +16,7 @@ use crate::io::polygon::{
 };
 use crate::io::words::{Dialect, Words};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::store::{Scratch, Table};
 
 /// Reads a PLY file in batches.
@@ -39,17 +37,14 @@ pub(crate) struct PlyReader {
     polygons: u64,
     polygon: PolygonCutter,
     discarded: Discarded,
-    parts: [Part; 1],
-    materials: [Material; 1],
 }
 
 impl PlyReader {
     pub(crate) fn open(
-        path: &Path,
+        input: Input,
         scratch: &Scratch,
         options: &ReadOptions,
     ) -> Result<Self, IoError> {
-        let input = Input::open(path, options.share_bytes)?;
         let mut words = Words::new(input, Dialect::Plain);
         let header = Header::read(&mut words)?;
         let body = Body::new(words, header.encoding);
@@ -71,8 +66,6 @@ impl PlyReader {
             polygons: 0,
             polygon: PolygonCutter::new(columns),
             discarded: Discarded::default(),
-            parts: Default::default(),
-            materials: Default::default(),
         })
     }
 
@@ -91,7 +84,7 @@ impl PlyReader {
             self.read_vertex(vertices)?;
         }
         if self.header.first_surface().is_some_and(|surface| surface < vertices) {
-            self.body.rewind()?;
+            self.body.rewind();
         } else {
             self.element = vertices + 1;
         }
@@ -266,14 +259,6 @@ impl MeshSource for PlyReader {
             }
         }
         Ok(!batch.is_empty())
-    }
-
-    fn parts(&self) -> &[Part] {
-        &self.parts
-    }
-
-    fn materials(&self) -> &[Material] {
-        &self.materials
     }
 
     fn discarded(&self) -> Discarded {

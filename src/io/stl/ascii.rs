@@ -9,7 +9,7 @@ use crate::io::error::{IoError, shown};
 use crate::io::input::Input;
 use crate::io::polygon::{Columns, Corner, Owner, PolygonCutter, polygon_number};
 use crate::io::words::{Dialect, Words};
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 
 const KEYWORD: &str = "solid, facet, vertex, endfacet or endsolid";
 
@@ -31,8 +31,6 @@ pub(crate) struct AsciiStlReader {
     facets: u64,
     polygon: PolygonCutter,
     discarded: Discarded,
-    parts: [Part; 1],
-    materials: [Material; 1],
 }
 
 impl AsciiStlReader {
@@ -43,8 +41,6 @@ impl AsciiStlReader {
             facets: 0,
             polygon: PolygonCutter::new(Columns::default()),
             discarded: Discarded::default(),
-            parts: Default::default(),
-            materials: Default::default(),
         }
     }
 
@@ -138,14 +134,6 @@ impl MeshSource for AsciiStlReader {
         batch.clear();
         while self.polygon.deliver(batch) && batch.len() < BATCH_TRIANGLES && self.read_facet()? {}
         Ok(!batch.is_empty())
-    }
-
-    fn parts(&self) -> &[Part] {
-        &self.parts
-    }
-
-    fn materials(&self) -> &[Material] {
-        &self.materials
     }
 
     fn discarded(&self) -> Discarded {

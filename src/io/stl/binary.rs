@@ -6,7 +6,7 @@
 use crate::io::BATCH_TRIANGLES;
 use crate::io::error::{IoError, Place};
 use crate::io::input::Input;
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 
 /// Header text and facet count.
 pub(crate) const HEADER_BYTES: usize = 84;
@@ -25,13 +25,25 @@ pub(crate) struct Facets {
 }
 
 /// Reads the facet count of a header; `None` if the file is too short for it.
-pub(crate) fn facets_by_size(header: &[u8], size_bytes: u64) -> Option<Facets> {
-    let count = u32::from_le_bytes(header.get(80..84)?.try_into().ok()?);
+pub(crate) fn facets_by_size(head: &[u8], size_bytes: u64) -> Option<Facets> {
+    let count = promised_facets(head)?;
     let body_bytes = size_bytes.checked_sub(HEADER_BYTES as u64)?;
     let (held, rest) = (body_bytes / FACET_BYTES as u64, body_bytes % FACET_BYTES as u64);
     let unpatched = count == 0 && rest == 0 && held <= u64::from(u32::MAX);
     let count = if unpatched { held } else { u64::from(count) };
     (count <= held).then_some(Facets { count, exact: count == held && rest == 0 && !unpatched })
+}
+
+/// Whether a file of unknown size that begins like this may be header, facets and nothing else.
+pub(crate) fn may_be_facets(head: &[u8]) -> bool {
+    let facets = head.get(HEADER_BYTES..).unwrap_or_default().chunks_exact(FACET_BYTES);
+    promised_facets(head).is_some_and(|count| count > 0)
+        && head.contains(&0)
+        && facets.map(corners).all(|corners| corners.as_flattened().iter().all(|c| c.is_finite()))
+}
+
+fn promised_facets(head: &[u8]) -> Option<u32> {
+    Some(u32::from_le_bytes(head.get(80..HEADER_BYTES)?.try_into().ok()?))
 }
 
 /// Streams binary facets.
@@ -40,8 +52,6 @@ pub(crate) struct BinaryStlReader {
     input: Input,
     count: u64,
     delivered: u64,
-    parts: [Part; 1],
-    materials: [Material; 1],
 }
 
 impl BinaryStlReader {
@@ -57,13 +67,7 @@ impl BinaryStlReader {
             let place = Place::Byte(size_bytes);
             return Err(IoError::unreadable(input.path(), place, expected, found));
         };
-        Ok(Self {
-            input,
-            count: facets.count,
-            delivered: 0,
-            parts: Default::default(),
-            materials: Default::default(),
-        })
+        Ok(Self { input, count: facets.count, delivered: 0 })
     }
 }
 
@@ -84,14 +88,6 @@ impl MeshSource for BinaryStlReader {
         batch.materials.resize(batch.corners.len(), 0);
         batch.polygons.extend(start as u32..end as u32);
         Ok(!batch.is_empty())
-    }
-
-    fn parts(&self) -> &[Part] {
-        &self.parts
-    }
-
-    fn materials(&self) -> &[Material] {
-        &self.materials
     }
 
     fn discarded(&self) -> Discarded {

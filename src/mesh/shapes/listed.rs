@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 
 use crate::mesh::shapes::Corners;
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 
 /// Triangles per batch: few, so that short lists come in several.
 const BATCH_TRIANGLES: usize = 1024;
@@ -16,16 +16,13 @@ pub struct ListedTriangles {
     indices: Vec<[u32; 3]>,
     vertices: Option<u64>,
     next: usize,
-    parts: [Part; 1],
-    materials: [Material; 1],
 }
 
 impl ListedTriangles {
     /// Triangles without vertex numbers, as in an STL file.
     #[must_use]
     pub fn without_indices(corners: Vec<Corners>) -> Self {
-        let (parts, materials) = Default::default();
-        Self { corners, indices: Vec::new(), vertices: None, next: 0, parts, materials }
+        Self { corners, indices: Vec::new(), vertices: None, next: 0 }
     }
 
     /// Triangles between numbered vertices, as in a PLY file.
@@ -54,14 +51,6 @@ impl MeshSource for ListedTriangles {
         }
         self.next = end;
         Ok(!batch.is_empty())
-    }
-
-    fn parts(&self) -> &[Part] {
-        &self.parts
-    }
-
-    fn materials(&self) -> &[Material] {
-        &self.materials
     }
 
     fn discarded(&self) -> Discarded {

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use exr::prelude::{ReadChannels, ReadLayers};
 
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::{Monitor, Void};
 use crate::report::image_exr::NO_PART;
 use crate::report::image_png::SEPARATOR_PX;
@@ -21,8 +21,7 @@ type Triangles = Vec<[[f64; 3]; 3]>;
 /// Delivers its triangles in batches of five, numbered as parts.
 struct Listed {
     left: std::vec::IntoIter<[[f64; 3]; 3]>,
-    parts: Vec<Part>,
-    materials: Vec<Material>,
+    parts: u32,
 }
 
 impl MeshSource for Listed {
@@ -31,17 +30,13 @@ impl MeshSource for Listed {
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, io::Error> {
         batch.clear();
         for corners in self.left.by_ref().take(5) {
-            let number = self.parts.len() as u32;
-            self.parts.push(Part::default());
-            batch.push(corners, number, 0, number);
+            batch.push(corners, self.parts, 0, self.parts);
+            self.parts += 1;
         }
         Ok(!batch.is_empty())
     }
-    fn parts(&self) -> &[Part] {
-        &self.parts
-    }
-    fn materials(&self) -> &[Material] {
-        &self.materials
+    fn part_count(&self) -> u64 {
+        self.parts.into()
     }
     fn discarded(&self) -> Discarded {
         Discarded::default()
@@ -55,11 +50,7 @@ impl MeshSource for Listed {
 }
 
 fn open(triangles: &Triangles) -> Result<Box<dyn MeshSource<Error = io::Error> + '_>, io::Error> {
-    Ok(Box::new(Listed {
-        left: triangles.clone().into_iter(),
-        parts: Vec::new(),
-        materials: vec![Material::default()],
-    }))
+    Ok(Box::new(Listed { left: triangles.clone().into_iter(), parts: 0 }))
 }
 
 /// The unit cube with normals outwards.
