@@ -9,12 +9,11 @@ use serde::{Deserialize, Serialize};
 use crate::contour::{ContourOptions, ContourStats, place_vertices, write_surface};
 use crate::defect::DefectKind;
 use crate::ingest::{
-    BinEntry, Bins, DropRecord, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup,
-    settle,
+    BinEntry, Bins, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup, settle,
 };
 use crate::io::{CoordinateType, Format, IoError, ReadOptions};
 use crate::monitor::{Counter, Monitor, Recording, Stage};
-use crate::octree::{BrickKey, Domain, Flips};
+use crate::octree::{BrickKey, Domain, DropRecord, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::finish::{Results, conclude};
@@ -235,7 +234,8 @@ impl Run<'_> {
     ) -> Result<BrickFile, RepairError> {
         self.recording.begin(Stage::Scan, bins.triangles.len());
         let mut items = ScanItems::new(bins, settled);
-        let (hits, stats) = scan(&bins.triangles, || items.next(), &findings.domain, resources)?;
+        let (triangles, drops) = (&bins.triangles, &settled.drops);
+        let (hits, stats) = scan(triangles, drops, || items.next(), &findings.domain, resources)?;
         findings.scan = stats;
         self.recording.end(Stage::Scan);
         Ok(hits)
@@ -360,16 +360,20 @@ fn to_json(findings: &Findings) -> String {
 struct ScanItems<'b> {
     bins: SpoolPeek<'b, BinEntry>,
     drops: SpoolPeek<'b, DropRecord>,
+    next_drop: u64,
 }
 
 impl<'b> ScanItems<'b> {
     fn new(bins: &'b Bins, settled: &'b Settled) -> Self {
-        Self { bins: SpoolPeek::new(&bins.entries), drops: SpoolPeek::new(&settled.drops) }
+        let (bins, drops) = (SpoolPeek::new(&bins.entries), SpoolPeek::new(&settled.drops));
+        Self { bins, drops, next_drop: 0 }
     }
 
     fn next(&mut self) -> Result<Option<ScanItem>, StoreError> {
         let Some(BinEntry { brick, first, count }) = self.bins.next()? else { return Ok(None) };
-        let drops = self.drops.take_while(|drop| drop.brick == brick, |drop| drop.source)?;
+        let first_drop = self.next_drop;
+        self.next_drop += self.drops.skip_while(|drop| drop.brick == brick)?;
+        let drops = first_drop..self.next_drop;
         Ok(Some(ScanItem { brick: BrickKey(brick), first, count, drops }))
     }
 }
