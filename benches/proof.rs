@@ -3,7 +3,7 @@
 use std::convert::Infallible;
 use std::hint::black_box;
 
-use brickmend::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use brickmend::mesh::{Discarded, MeshSource, TriangleBatch};
 use brickmend::monitor::Void;
 use brickmend::store::Scratch;
 use brickmend::verify::{Outward, ProofOptions, ProvedSource, prove};
@@ -66,12 +66,6 @@ impl MeshSource for Show<'_> {
         self.next += 1;
         batch.clone_from(next);
         Ok(true)
-    }
-    fn parts(&self) -> &[Part] {
-        &[]
-    }
-    fn materials(&self) -> &[Material] {
-        &[]
     }
     fn discarded(&self) -> Discarded {
         Discarded::default()

@@ -88,14 +88,17 @@ impl Workshop {
     pub fn scan(&self, model: &Ingested) -> (BrickFile, ScanStats) {
         let mut bins = SpoolPeek::new(&model.bins.entries);
         let mut drops = SpoolPeek::new(&model.settled.drops);
+        let mut next_drop = 0;
         let next = || {
             let Some(bin) = bins.next()? else { return Ok(None) };
-            let drops = drops.take_while(|drop| drop.brick == bin.brick, |drop| drop.source)?;
-            let brick = BrickKey(bin.brick);
+            let first_drop = next_drop;
+            next_drop += drops.skip_while(|drop| drop.brick == bin.brick)?;
+            let (brick, drops) = (BrickKey(bin.brick), first_drop..next_drop);
             Ok(Some(ScanItem { brick, first: bin.first, count: bin.count, drops }))
         };
         let resources = self.resources();
-        scan(&model.bins.triangles, next, &model.domain, &resources).expect("scan works")
+        let (triangles, drops) = (&model.bins.triangles, &model.settled.drops);
+        scan(triangles, drops, next, &model.domain, &resources).expect("scan works")
     }
 
     pub fn patch(&self, model: &Ingested, hits: &BrickFile) -> Flips {

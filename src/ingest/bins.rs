@@ -3,6 +3,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::ingest::area::{AreaHistogram, SoupMeasure};
+use crate::ingest::crowds::{CrowdFilter, LeftOut};
 use crate::ingest::soup::Soup;
 use crate::ingest::touch::for_each_touched_brick;
 use crate::monitor::{Gauge, Resident};
@@ -34,17 +35,24 @@ pub struct Bins {
     pub triangles: Spool<SoupTriangle>,
     /// The bins by ascending brick key.
     pub entries: Spool<BinEntry>,
+    /// What is in no bin.
+    pub left_out: LeftOut,
 }
 
 impl Bins {
-    /// Opens the bins that an earlier run left.
+    /// Opens the bins that an earlier run left, from which it left out so much.
     ///
     /// # Errors
     /// They are missing or damaged.
-    pub fn open(resources: &Resources, files: &[FileState]) -> Result<Self, StoreError> {
+    pub fn open(
+        resources: &Resources,
+        files: &[FileState],
+        left_out: LeftOut,
+    ) -> Result<Self, StoreError> {
         Ok(Self {
             triangles: Spool::open(resources.scratch, FileState::find(files, BINS)?)?,
             entries: Spool::open(resources.scratch, FileState::find(files, BIN_ENTRIES)?)?,
+            left_out,
         })
     }
 
@@ -55,7 +63,7 @@ impl Bins {
     }
 }
 
-/// Sorts the triangles of `soup` into bins.
+/// Sorts the triangles of `soup` into bins. Of triangles that come in crowds, pairs are left out.
 ///
 /// # Errors
 /// The scratch disk fails, or the caller cancels.
@@ -65,6 +73,7 @@ pub fn fill_bins(
     resources: &Resources,
 ) -> Result<(Bins, SoupMeasure), StoreError> {
     let mut histogram = AreaHistogram::new(soup.facts.bounds);
+    let mut filter = CrowdFilter::new(domain);
     let mut sorter = Sorter::<BinTriangle>::new(resources.scratch, resources.share_bytes);
     let mut next = 0;
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
@@ -77,8 +86,15 @@ pub fn fill_bins(
             let mut triangles = Vec::new();
             soup.spool.read(next, ITEM_TRIANGLES, &mut triangles)?;
             next += triangles.len() as u64;
+            triangles.iter().for_each(|triangle| histogram.add(triangle));
+            let is_last = triangles.is_empty();
+            if is_last {
+                triangles = filter.finish();
+            } else {
+                filter.thin_out(&mut triangles);
+            }
             let held = resident.hold(triangles.len());
-            Ok((!triangles.is_empty()).then_some((triangles, held)))
+            Ok((!is_last || !triangles.is_empty()).then_some((triangles, held)))
         },
         || (),
         |(), (triangles, held): (Vec<SoupTriangle>, _)| {
@@ -90,14 +106,13 @@ pub fn fill_bins(
                     Ok::<(), StoreError>(())
                 })?;
             }
-            Ok((triangles, binned, held))
+            Ok((binned, held))
         },
-        |(triangles, binned, _held)| {
-            triangles.iter().for_each(|triangle| histogram.add(triangle));
-            sorter.extend(&binned)
-        },
+        |(binned, _held)| sorter.extend(&binned),
     )?;
-    Ok((write_bins(sorter, resources)?, histogram.finish()))
+    let mut bins = write_bins(sorter, resources)?;
+    bins.left_out = filter.left_out();
+    Ok((bins, histogram.finish()))
 }
 
 fn write_bins(sorter: Sorter<BinTriangle>, resources: &Resources) -> Result<Bins, StoreError> {
@@ -120,5 +135,6 @@ fn write_bins(sorter: Sorter<BinTriangle>, resources: &Resources) -> Result<Bins
         triangles.push(binned.triangle)?;
     }
     open.map_or(Ok(()), |done| entries.push(done))?;
-    Ok(Bins { triangles: triangles.finish()?, entries: entries.finish()? })
+    let (triangles, entries) = (triangles.finish()?, entries.finish()?);
+    Ok(Bins { triangles, entries, left_out: LeftOut::default() })
 }

@@ -1,56 +1,40 @@
 //! Settles duplicates and finds rims, bin by bin.
 //!
 //! XOR parity cancels an exact double sheet, so of the copies of a triangle one counts or none,
-//! decided per connected patch of duplicates: none where the patch is the interface of two solids
-//! (all along its rim other triangles meet it, in even number and not zero), else one.
+//! decided per connected patch of copies; the rule stands in `facts`.
 //!
 //! In:         bins. Every triangle with a given edge or with given corners lies in the bin of the
 //!             brick that holds the lower end, so each bin decides what it owns.
 //! Out:        [`Settled`]: per bin the triangles that do not count, and the rims of the soup.
-//! Invariant:  the answer depends on the snapped triangles alone.
-//! Memory:     the share; tables over all triangles exist only when there are duplicates.
+//! Invariant:  the answer depends on the triangles alone, not on their order or on any share.
+//! Memory:     the share; tables over all triangles exist only when there are duplicates. What a
+//!             bin finds goes straight into sorts that all bins share.
 
-use bytemuck::{Pod, Zeroable};
+use std::sync::{Mutex, PoisonError};
+
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::bins::Bins;
-use crate::ingest::examine::{Copy3, Fact, RIM_KEEP, SAW_INTERFACE, SAW_KEEP, examine_bin};
-use crate::ingest::packed::NO_GROUP;
-use crate::octree::Domain;
+use crate::ingest::examine::Examiner;
+use crate::ingest::facts::{
+    Copied, Fact, JOINED, Outbox, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, counts_once,
+};
+use crate::octree::{Domain, DropRecord};
 use crate::store::{
-    FileState, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
+    FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
 };
 
 /// Spool of the triangles that do not count.
 pub const DROPS: &str = "drops.spool";
-
-/// A triangle that does not count in a bin: a copy that was settled away.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct DropRecord {
-    /// Key of the brick.
-    pub brick: u64,
-    /// Source number.
-    pub source: u32,
-    /// Zero.
-    pub unused: u32,
-}
-
-impl Record for DropRecord {
-    type Key = (u64, u32);
-    fn key(&self) -> (u64, u32) {
-        (self.brick, self.source)
-    }
-}
 
 /// What was found out about duplicates and rims.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct SettleStats {
     /// Triangles that had a copy before them in the file.
     pub duplicate_triangles: u64,
-    /// Distinct triangles dropped with all copies: interfaces of abutting solids.
+    /// Distinct triangles dropped with all copies: interfaces of abutting solids, and folds.
     pub interface_triangles: u64,
-    /// Edges of the snapped soup that an odd number of triangles meets.
+    /// Edges of the snapped soup, duplicates settled, that an odd number of triangles meets.
     pub rim_edges: u64,
     /// Their length, model units.
     pub rim_length: f64,
@@ -80,8 +64,8 @@ impl Settled {
     }
 }
 
-/// Share of one bin's sorts within the share of a worker.
-const SORT_PARTS: u64 = 3;
+/// Sorts of one bin that are alive at one time.
+const BIN_SORTS: u64 = 2;
 
 /// Settles the duplicates of all bins; `triangles` is the number of source numbers.
 ///
@@ -93,11 +77,16 @@ pub fn settle(
     triangles: u64,
     resources: &Resources,
 ) -> Result<Settled, StoreError> {
+    let scratch = resources.scratch;
     let workers = resources.pool.current_num_threads() as u64;
-    let bin_share = resources.share_bytes / 2 / workers / SORT_PARTS;
-    let mut copies = Sorter::<Copy3>::new(resources.scratch, resources.share_bytes / 8);
-    let mut facts = Sorter::<Fact>::new(resources.scratch, resources.share_bytes / 8);
-    let mut stats = SettleStats::default();
+    let share_bytes = resources.share_bytes / 2 / workers / BIN_SORTS;
+    let copies = Mutex::new(Sorter::new(scratch, resources.share_bytes / 8));
+    let facts = Mutex::new(Sorter::new(scratch, resources.share_bytes / 8));
+    let mut stats = SettleStats {
+        duplicate_triangles: bins.left_out.triangles,
+        degenerate_triangles: bins.left_out.degenerate_triangles,
+        ..SettleStats::default()
+    };
     let mut next = 0;
     let mut entries = Vec::new();
     ordered(
@@ -110,23 +99,25 @@ pub fn settle(
             next += 1;
             Ok(entries.first().copied())
         },
-        || (),
-        |(), entry| examine_bin(bins, entry, domain, resources.scratch, bin_share),
-        |found| {
-            copies.extend(&found.copies)?;
-            facts.extend(&found.facts)?;
-            stats.rim_edges += found.stats.rim_edges;
-            stats.rim_length += found.stats.rim_length;
-            stats.degenerate_triangles += found.stats.degenerate_triangles;
+        || {
+            let (copies, facts) = (Outbox::new(&copies), Outbox::new(&facts));
+            Examiner { bins, domain, scratch, share_bytes, copies, facts }
+        },
+        |examiner, entry| examiner.examine(entry),
+        |found: SettleStats| {
+            stats.rim_edges += found.rim_edges;
+            stats.rim_length += found.rim_length;
+            stats.degenerate_triangles += found.degenerate_triangles;
             Ok(())
         },
     )?;
-    let mut drops = Sorter::<DropRecord>::new(resources.scratch, resources.share_bytes / 4);
+    let (copies, facts) = (unlock(copies), unlock(facts));
+    let mut drops = Sorter::<DropRecord>::new(scratch, resources.share_bytes / 4);
     if !copies.is_empty() {
-        let mut verdicts = judge_patches(facts, triangles, resources)?;
+        let mut verdicts = Verdicts::judge(facts, triangles, resources, &mut stats)?;
         collect_drops(copies, &mut verdicts, &mut drops, &mut stats)?;
     }
-    let mut spool = SpoolWriter::create(resources.scratch, DROPS)?;
+    let mut spool = SpoolWriter::create(scratch, DROPS)?;
     let mut sorted = drops.finish()?;
     while let Some(record) = sorted.next()? {
         spool.push(record)?;
@@ -134,63 +125,112 @@ pub fn settle(
     Ok(Settled { drops: spool.finish()?, stats })
 }
 
-/// The patches that are interfaces: a table over source numbers, one for the smallest member.
-fn judge_patches(
-    facts: Sorter<Fact>,
-    triangles: u64,
-    resources: &Resources,
-) -> Result<(Unite, Table<u32>), StoreError> {
-    let share = resources.share_bytes / 4;
-    let mut patches = Unite::new(resources.scratch, share, triangles)?;
-    let mut spool = SpoolWriter::<Fact>::create(resources.scratch, "facts.spool")?;
-    let mut sorted = facts.finish()?;
-    while let Some(fact) = sorted.next()? {
-        if fact.what < RIM_KEEP {
-            patches.unite(fact.group, fact.what)?;
-        } else {
-            spool.push(fact)?;
-        }
-    }
-    let rims = spool.finish()?;
-    let mut saw = Table::<u32>::new(resources.scratch, share);
-    for _ in 0..triangles {
-        saw.push(0)?;
-    }
-    let mut reader = rims.reader(0, rims.len());
-    while let Some(block) = reader.next_block()? {
-        for fact in block {
-            let patch = u64::from(patches.find(fact.group)?);
-            let bit = if fact.what == RIM_KEEP { SAW_KEEP } else { SAW_INTERFACE };
-            let before = saw.get(patch)?;
-            saw.set(patch, before | bit)?;
-        }
-    }
-    Ok((patches, saw))
+fn unlock<T>(mutex: Mutex<T>) -> T {
+    mutex.into_inner().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Turns copies into drops: all but the first, or all where the patch is an interface.
+/// What becomes of each patch of groups: tables over source numbers, one for the smallest member.
+struct Verdicts {
+    patches: Unite,
+    kinds: Table<u32>,
+}
+
+impl Verdicts {
+    /// Brings the facts of each patch together, and counts the rims that its verdict leaves open.
+    fn judge(
+        facts: Sorter<Fact>,
+        triangles: u64,
+        resources: &Resources,
+        stats: &mut SettleStats,
+    ) -> Result<Self, StoreError> {
+        let share = resources.share_bytes / 4;
+        let mut patches = Unite::new(resources.scratch, share, triangles)?;
+        let mut spool = SpoolWriter::<Fact>::create(resources.scratch, "facts.spool")?;
+        let mut sorted = facts.finish()?;
+        while let Some(fact) = sorted.next()? {
+            if fact.kind == JOINED {
+                patches.unite(fact.group, fact.value as u32)?;
+            } else {
+                spool.push(fact)?;
+            }
+        }
+        let told = spool.finish()?;
+        let mut kinds = Table::<u32>::new(resources.scratch, share);
+        for _ in 0..triangles {
+            kinds.push(0)?;
+        }
+        let mut verdicts = Self { patches, kinds };
+        each(&told, |fact| {
+            let patch = u64::from(verdicts.patches.find(fact.group)?);
+            let before = verdicts.kinds.get(patch)?;
+            verdicts.kinds.set(patch, before | fact.kind)
+        })?;
+        // One triangle of each group on an edge that is otherwise even leaves it open.
+        let open_when_once = RIM_EVEN | RIM_ALONE_OPEN | RIM_ALONE_CLOSED;
+        each(&told, |fact| {
+            if fact.kind & open_when_once != 0 && verdicts.counts_once(fact.group)? {
+                stats.add_rim(f64::from_bits(fact.value));
+            }
+            Ok(())
+        })?;
+        Ok(verdicts)
+    }
+
+    /// Whether of an even group one triangle counts.
+    fn counts_once(&mut self, group: u32) -> Result<bool, StoreError> {
+        let patch = u64::from(self.patches.find(group)?);
+        Ok(counts_once(self.kinds.get(patch)?))
+    }
+}
+
+fn each(
+    spool: &Spool<Fact>,
+    mut visit: impl FnMut(&Fact) -> Result<(), StoreError>,
+) -> Result<(), StoreError> {
+    let mut reader = spool.reader(0, spool.len());
+    while let Some(block) = reader.next_block()? {
+        block.iter().try_for_each(&mut visit)?;
+    }
+    Ok(())
+}
+
+/// The copies of one group in one brick.
+struct Run {
+    brick: u64,
+    group: u32,
+    copies: u64,
+}
+
+/// Turns copies into drops: all but the first, and the first as well where none counts.
 fn collect_drops(
-    copies: Sorter<Copy3>,
-    (patches, saw): &mut (Unite, Table<u32>),
+    copies: Sorter<Copied>,
+    verdicts: &mut Verdicts,
     drops: &mut Sorter<DropRecord>,
     stats: &mut SettleStats,
 ) -> Result<(), StoreError> {
     let mut sorted = copies.finish()?;
-    let mut group = NO_GROUP;
-    let mut home = 0;
-    let mut interface = false;
-    while let Some(copy) = sorted.next()? {
-        if copy.group != group {
-            group = copy.group;
-            home = copy.brick;
-            interface = saw.get(u64::from(patches.find(group)?))? == SAW_INTERFACE;
-            stats.interface_triangles += u64::from(interface);
+    let mut next = sorted.next()?;
+    let mut before = None;
+    while let Some(first) = next {
+        let mut run = Run { brick: first.brick, group: first.group, copies: 0 };
+        while let Some(copy) = next
+            && (copy.group, copy.brick) == (run.group, run.brick)
+        {
+            run.copies += 1;
+            if copy.source != run.group {
+                drops.push(DropRecord { brick: copy.brick, source: copy.source, unused: 0 })?;
+            }
+            next = sorted.next()?;
         }
-        let first = copy.source == group;
-        // A copy lies in many bins; it is counted in the first of them.
-        stats.duplicate_triangles += u64::from(!first && copy.brick == home);
-        if !first || interface {
-            drops.push(DropRecord { brick: copy.brick, source: copy.source, unused: 0 })?;
+        let goes = run.copies.is_multiple_of(2) && !verdicts.counts_once(run.group)?;
+        if goes {
+            drops.push(DropRecord { brick: run.brick, source: run.group, unused: 0 })?;
+        }
+        // A group lies in many bins; it is counted in the first of them.
+        if before != Some(run.group) {
+            stats.duplicate_triangles += run.copies - 1;
+            stats.interface_triangles += u64::from(goes);
+            before = Some(run.group);
         }
     }
     Ok(())

@@ -12,16 +12,22 @@
 
 mod area;
 mod bins;
+mod crowds;
 mod duplicates;
+mod edges;
 mod error;
 mod examine;
+mod facts;
 mod packed;
+#[cfg(test)]
+mod settle_tests;
 mod soup;
 mod touch;
 
 pub use area::SoupMeasure;
 pub use bins::{BIN_ENTRIES, BINS, BinEntry, Bins, fill_bins};
-pub use duplicates::{DROPS, DropRecord, SettleStats, Settled, settle};
+pub use crowds::LeftOut;
+pub use duplicates::{DROPS, SettleStats, Settled, settle};
 pub use error::IngestError;
 pub use soup::{ATTRIBUTES, AttributeRecord, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use touch::for_each_touched_brick;

@@ -5,16 +5,32 @@ use std::hash::{BuildHasherDefault, Hasher};
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::octree::LATTICE_BITS;
+use crate::octree::{Domain, LATTICE_BITS, SoupTriangle};
 use crate::store::Record;
 
 pub(crate) type Point = [u32; 3];
 
-/// A triangle by its sorted corners.
+/// The corners of a triangle on the lattice.
+pub(crate) fn snapped(domain: &Domain, triangle: &SoupTriangle) -> [Point; 3] {
+    triangle.corners.map(|c| domain.snap(c).map(|q| q as u32))
+}
+
+/// Whether the corners lie on one line.
+pub(crate) fn is_degenerate(corners: [Point; 3]) -> bool {
+    let [p, q, r] = corners.map(|c| c.map(i64::from));
+    (0..3).all(|a| {
+        let (u, v) = ((a + 1) % 3, (a + 2) % 3);
+        (q[u] - p[u]) * (r[v] - p[v]) == (q[v] - p[v]) * (r[u] - p[u])
+    })
+}
+
+/// A triangle by its sorted corners on the lattice.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Triple {
     pub(crate) corners: [u64; 4],
+    /// See [`given_triangle`].
+    pub(crate) given: u64,
     pub(crate) source: u64,
 }
 
@@ -25,22 +41,75 @@ impl Record for Triple {
     }
 }
 
-/// An edge of a triangle, and the group of duplicates that the triangle is in.
+/// A triangle of a group of copies; by source number.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct Member {
+    pub(crate) source: u32,
+    pub(crate) group: u32,
+}
+
+impl Record for Member {
+    type Key = u32;
+    fn key(&self) -> u32 {
+        self.source
+    }
+}
+
+/// An edge of a triangle, and the group of copies that the triangle is in.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct EdgeUse {
     pub(crate) ends: [u64; 3],
+    /// See [`given_edge`].
+    pub(crate) given: u64,
     pub(crate) group: u32,
-    pub(crate) source: u32,
+    pub(crate) unused: u32,
 }
 
+/// The triangle has no copy.
 pub(crate) const NO_GROUP: u32 = u32::MAX;
+/// Two corners of the triangle are one on the lattice: it counts nowhere, with or without copies.
+pub(crate) const NO_WIDTH: u32 = u32::MAX - 1;
 
 impl Record for EdgeUse {
-    type Key = ([u64; 3], u32, u32);
+    type Key = ([u64; 3], u32, u64);
     fn key(&self) -> Self::Key {
-        (self.ends, self.group, self.source)
+        (self.ends, self.group, self.given)
     }
+}
+
+/// A corner as the file gives it, as words; -0 and 0 are one place.
+pub(crate) type Given = [u64; 3];
+
+pub(crate) fn given(corner: [f64; 3]) -> Given {
+    corner.map(|c| (c + 0.0).to_bits())
+}
+
+/// The corners of a triangle as given, whatever their order.
+pub(crate) fn given_corners(corners: &[[f64; 3]; 3]) -> [Given; 3] {
+    let mut corners = corners.map(given);
+    corners.sort_unstable();
+    corners
+}
+
+/// Tells triangles apart by their corners as given.
+pub(crate) fn given_triangle(corners: &[[f64; 3]; 3]) -> u64 {
+    mix(given_corners(corners).as_flattened())
+}
+
+/// Tells edges apart by their ends as given.
+pub(crate) fn given_edge(a: [f64; 3], b: [f64; 3]) -> u64 {
+    let (a, b) = (given(a), given(b));
+    mix([a.min(b), a.max(b)].as_flattened())
+}
+
+/// Mixes words by folded multiplication.
+pub(crate) fn mix(words: &[u64]) -> u64 {
+    words.iter().fold(0x2D35_8DCC_AA6C_78A5, |mixed, word| {
+        let product = u128::from(mixed ^ word) * 0x9E37_79B9_7F4A_7C15_u128;
+        (product as u64 ^ (product >> 64) as u64).rotate_left(29) ^ word
+    })
 }
 
 /// Three corners of 84 bits, one bit short of four words: comparing words is comparing corners.

@@ -26,4 +26,4 @@ pub use index::{BrickIndex, Neighbour};
 pub use key::BrickKey;
 pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
-pub use triangle::{BinTriangle, SoupTriangle, TRANSPARENT};
+pub use triangle::{BinTriangle, DropRecord, SoupTriangle, TRANSPARENT};

@@ -39,3 +39,22 @@ impl Record for BinTriangle {
         (self.brick, self.triangle.source)
     }
 }
+
+/// A triangle that does not count in a bin: a copy that was settled away. 16 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+#[repr(C)]
+pub struct DropRecord {
+    /// Key of the brick.
+    pub brick: u64,
+    /// Source number.
+    pub source: u32,
+    /// Zero.
+    pub unused: u32,
+}
+
+impl Record for DropRecord {
+    type Key = (u64, u32);
+    fn key(&self) -> (u64, u32) {
+        (self.brick, self.source)
+    }
+}

@@ -1,5 +1,10 @@
 //! Pairs the odd faces of one cut, nearest together.
+//!
+//! A cut may have millions of them. They come along a Hilbert curve, and are paired in windows of
+//! [`WINDOW_FACES`]: on the curve near ones are together, so a larger window would hardly help.
 
+/// Most faces that are paired at one time. Even, so that windows of an even number are even.
+pub const WINDOW_FACES: usize = 4096;
 /// Up to this many faces the pairing is the best there is.
 const EXACT_FACES: usize = 16;
 /// Rounds of local improvement on larger sets, and how far along the curve they look.
@@ -13,7 +18,8 @@ fn distance(a: Place, b: Place) -> u64 {
     a[0].abs_diff(b[0]) + a[1].abs_diff(b[1])
 }
 
-/// Pairs an even number of places: index pairs, each place in exactly one.
+/// Pairs an even number of places, which come along the curve: index pairs, each place in exactly
+/// one.
 pub fn pair(places: &[Place]) -> Vec<(usize, usize)> {
     assert!(places.len().is_multiple_of(2), "an even number of faces meets a cut");
     match places.len() {
@@ -57,11 +63,9 @@ fn pair_exactly(places: &[Place]) -> Vec<(usize, usize)> {
     pairs
 }
 
-/// Neighbours along a Hilbert curve, then exchanges between pairs that are close on it.
+/// Neighbours along the curve, then exchanges between pairs that are close on it.
 fn pair_along_curve(places: &[Place]) -> Vec<(usize, usize)> {
-    let mut order: Vec<usize> = (0..places.len()).collect();
-    order.sort_by_key(|&i| (hilbert(places[i]), i));
-    let mut pairs: Vec<_> = order.chunks_exact(2).map(|two| (two[0], two[1])).collect();
+    let mut pairs: Vec<_> = (0..places.len()).step_by(2).map(|first| (first, first + 1)).collect();
     for _ in 0..IMPROVEMENT_ROUNDS {
         let mut changed = false;
         for i in 0..pairs.len() {
@@ -89,25 +93,24 @@ fn exchange(places: &[Place], pairs: &mut [(usize, usize)], i: usize, j: usize) 
     true
 }
 
-/// Place on a Hilbert curve over 2^24 units a side (Hilbert 1891).
-fn hilbert(place: Place) -> u64 {
-    let mut x = place[0].clamp(0, (1 << 24) - 1) as u64;
-    let mut y = place[1].clamp(0, (1 << 24) - 1) as u64;
-    let mut key = 0;
-    let mut s = 1_u64 << 23;
-    while s > 0 {
-        let (rx, ry) = (u64::from(x & s > 0), u64::from(y & s > 0));
-        key += s * s * ((3 * rx) ^ ry);
+/// Number of a cell on a Hilbert curve over 2^levels cells a side (Hilbert 1891).
+///
+/// Places in different cells come along the curve in the order of their cells, however fine the
+/// curve is drawn.
+pub fn along_curve(cell: [u32; 2], levels: u32) -> u32 {
+    let [mut x, mut y] = cell;
+    let mut number = 0;
+    for level in (0..levels).rev() {
+        let (rx, ry) = (x >> level & 1, y >> level & 1);
+        number = number << 2 | ((3 * rx) ^ ry);
         if ry == 0 {
             if rx == 1 {
-                x ^= (1 << 24) - 1;
-                y ^= (1 << 24) - 1;
+                (x, y) = (!x, !y);
             }
             (x, y) = (y, x);
         }
-        s >>= 1;
     }
-    key
+    number
 }
 
 #[cfg(test)]
@@ -128,13 +131,35 @@ mod tests {
         assert!(seen.iter().all(|&count| count == 1));
     }
 
+    /// The order in which places come.
+    fn order(places: &mut Vec<Place>) {
+        places.truncate(places.len() / 2 * 2);
+        places.sort_by_key(|place| along_curve(place.map(|c| c as u32), 24));
+    }
+
     fn places(count: std::ops::Range<usize>) -> impl Strategy<Value = Vec<Place>> {
         proptest::collection::vec(proptest::array::uniform2(0..5000_i64), count).prop_map(
-            |mut p| {
-                p.truncate(p.len() / 2 * 2);
-                p
+            |mut places| {
+                order(&mut places);
+                places
             },
         )
+    }
+
+    #[test]
+    fn the_curve_goes_from_cell_to_neighbour_through_all_of_them() {
+        for levels in 1..7 {
+            let side = 1_u32 << levels;
+            let mut cells = vec![None; (side * side) as usize];
+            for (x, y) in (0..side).flat_map(|x| (0..side).map(move |y| (x, y))) {
+                cells[along_curve([x, y], levels) as usize] = Some([x, y]);
+            }
+            let cells: Vec<[u32; 2]> = cells.into_iter().map(|c| c.expect("each once")).collect();
+            for pair in cells.windows(2) {
+                let apart: u32 = (0..2).map(|a| pair[0][a].abs_diff(pair[1][a])).sum();
+                assert_eq!(apart, 1);
+            }
+        }
     }
 
     proptest! {

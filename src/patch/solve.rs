@@ -6,13 +6,14 @@
 //! flipping the edges between them. A flip toggles its two faces in the cut, and two across it,
 //! which lie in later cuts.
 //!
-//! Memory: one bucket of faces per level and axis, each an external sort; resident is one cut.
+//! Memory: one bucket of faces per level and axis, each an external sort; of a cut one window of
+//! faces at a time, however many there are.
 //! Source: Ju 2004, section 4.2; time-forward processing after Chiang et al. 1995.
 
 use crate::octree::Flip;
 use crate::patch::Opening;
 use crate::patch::faces::OddFace;
-use crate::patch::pair::{Place, pair};
+use crate::patch::pair::{Place, WINDOW_FACES, along_curve, pair};
 use crate::patch::path::{SUB, Step, walk};
 use crate::store::{Record, Scratch, Sorted, Sorter, StoreError};
 
@@ -21,21 +22,34 @@ use bytemuck::{Pod, Zeroable};
 /// Levels of the largest component: the whole grid at depth 15.
 const MAX_LEVELS: usize = 16;
 
-/// An odd face in the frame of its cut, sorted by cut, group and place.
+/// An odd face in the frame of its cut, sorted by cut, group and place along a curve. 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 struct CutFace {
-    plane: u32,
-    group: [u32; 2],
-    cell: [u32; 2],
+    /// Number of its cell on the curve.
+    curve: u32,
+    cell: [u16; 2],
+    plane: u16,
+    group: [u16; 2],
     sub: [u8; 2],
-    unused: u16,
 }
 
 impl Record for CutFace {
-    type Key = (u32, [u32; 2], [u32; 2], [u8; 2]);
+    type Key = (u16, [u16; 2], u32, [u8; 2]);
     fn key(&self) -> Self::Key {
-        (self.plane, self.group, self.cell, self.sub)
+        (self.plane, self.group, self.curve, self.sub)
+    }
+}
+
+impl CutFace {
+    /// Whether both are one face.
+    fn is_at(&self, other: &Self) -> bool {
+        self.is_beside(other) && self.curve == other.curve
+    }
+
+    /// Whether both lie in the same cut of the same node.
+    fn is_beside(&self, other: &Self) -> bool {
+        (self.plane, self.group) == (other.plane, other.group)
     }
 }
 
@@ -194,9 +208,11 @@ impl Cuts {
         let level = levels - 1 - plane.trailing_zeros();
         let across = [(axis + 1) % 3, (axis + 2) % 3];
         // Axes that were cut at this level already separate halves, the others whole nodes.
-        let group = across.map(|a| relative[a] >> (levels - level - u32::from(a < axis)));
+        let group = across.map(|a| (relative[a] >> (levels - level - u32::from(a < axis))) as u16);
         let cell = across.map(|a| relative[a]);
-        let record = CutFace { plane, group, cell, sub: face.sub, unused: 0 };
+        let curve = along_curve(cell, levels);
+        let (plane, cell) = (plane as u16, cell.map(|c| c as u16));
+        let record = CutFace { curve, cell, plane, group, sub: face.sub };
         let bucket = &mut self.buckets[level as usize * 3 + axis];
         let (scratch, share) = (&self.scratch, self.bucket_share);
         bucket.get_or_insert_with(|| Sorter::new(scratch, share)).push(record)
@@ -204,41 +220,44 @@ impl Cuts {
 
     /// Cuts level by level, axis by axis.
     fn run(&mut self, emit: &mut Emit) -> Result<(), StoreError> {
+        let mut window = Vec::new();
         for number in 0..self.buckets.len() {
             let Some(bucket) = self.buckets[number].take() else { continue };
             let mut sorted = bucket.finish()?;
-            let mut group: Vec<CutFace> = Vec::new();
-            while let Some(face) = sorted.next()? {
-                if group.last().is_some_and(|l| (l.plane, l.group) != (face.plane, face.group)) {
-                    self.close_group(number % 3, &mut group, emit)?;
+            let mut next = sorted.next()?;
+            while let Some(face) = next {
+                let mut count = 0;
+                while next.is_some_and(|other| other.is_at(&face)) {
+                    count += 1;
+                    next = sorted.next()?;
                 }
-                group.push(face);
+                // Toggled twice is not odd.
+                if count % 2 == 1 {
+                    window.push(face);
+                }
+                let goes_on = next.is_some_and(|other| other.is_beside(&face));
+                if window.len() == WINDOW_FACES || !goes_on {
+                    self.close_window(number % 3, &mut window, emit)?;
+                }
             }
-            self.close_group(number % 3, &mut group, emit)?;
         }
         Ok(())
     }
 
-    /// Pairs the odd faces of one node's cut and flips the edges on the ways between them.
-    fn close_group(
+    /// Pairs odd faces of one node's cut and flips the edges on the ways between them.
+    fn close_window(
         &mut self,
         axis: usize,
-        group: &mut Vec<CutFace>,
+        window: &mut Vec<CutFace>,
         emit: &mut Emit,
     ) -> Result<(), StoreError> {
-        // Toggled twice is not odd.
-        let odd: Vec<CutFace> = group
-            .chunk_by(|a, b| a.cell == b.cell)
-            .filter(|same| same.len() % 2 == 1)
-            .map(|same| same[0])
-            .collect();
-        group.clear();
-        let places: Vec<Place> = odd
+        let places: Vec<Place> = window
             .iter()
             .map(|f| [0, 1].map(|i| i64::from(f.cell[i]) * SUB + i64::from(f.sub[i])))
             .collect();
+        let plane = window.first().map_or(0, |face| u32::from(face.plane));
+        window.clear();
         for (a, b) in pair(&places) {
-            let plane = odd[a].plane;
             walk(places[a], places[b], |step| self.flip(axis, plane, step, emit))?;
         }
         Ok(())
@@ -310,14 +329,22 @@ mod tests {
         let mut faces: Vec<OddFace> =
             odd_faces(edges).iter().map(|&(axis, at)| OddFace::new(axis, at, [128; 2])).collect();
         faces.sort_unstable_by_key(Record::key);
-        let mut flips = Vec::new();
+        let (mut flips, mut streamed) = (Vec::new(), Vec::new());
         if !faces.is_empty() {
-            solver
-                .solve(&faces, &mut |flip| {
-                    flips.push(flip);
-                    Ok(())
-                })
-                .expect("solving works");
+            let mut emit = |flip| {
+                flips.push(flip);
+                Ok(())
+            };
+            let opening = solver.solve(&faces, &mut emit).expect("solving works");
+            let mut sorter = Sorter::new(&scratch, share_bytes);
+            sorter.extend(&faces).expect("pushing works");
+            let sorted = sorter.finish().expect("sorting works");
+            let mut emit = |flip| {
+                streamed.push(flip);
+                Ok(())
+            };
+            let again = solver.solve_sorted(sorted, &mut emit).expect("solving works");
+            assert_eq!((opening, &flips), (again, &streamed), "a stream is solved like a list");
         }
         flips
     }
@@ -362,6 +389,24 @@ mod tests {
                 .collect();
             prop_assert_eq!(solve(&edges, 1 << 20), back);
         }
+    }
+
+    #[test]
+    fn a_cut_with_many_faces_is_closed_alike_from_disk() {
+        // A slab of noise, whose first cut goes through its middle.
+        let mut state = 1_u64;
+        let mut below = |count: u64| {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1);
+            ((state >> 33) % count) as u32
+        };
+        let edges: HashSet<(usize, [u32; 3])> = (0..60_000)
+            .map(|_| (below(3) as usize, [3 + below(3), 3 + below(220), 3 + below(220)]))
+            .collect();
+        let in_first_cut = odd_faces(&edges).iter().filter(|(a, at)| *a == 0 && at[0] == 4).count();
+        assert!(in_first_cut > 2 * WINDOW_FACES, "{in_first_cut} faces");
+        let flips = solve(&edges, 1 << 28);
+        assert_eq!(residual(&edges, &flips), 0);
+        assert!(flips == solve(&edges, 16 << 10), "other flips from disk");
     }
 
     #[test]

@@ -5,13 +5,13 @@ use serde::{Deserialize, Serialize};
 use crate::contour::{ContourOptions, ContourStats, WriteProgress, place_vertices, write_surface};
 use crate::defect::DefectKind;
 use crate::ingest::{
-    BinEntry, Bins, DropRecord, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, fill_bins,
+    BinEntry, Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, fill_bins,
     read_soup, settle,
 };
 use crate::io::{CoordinateType, ReadOptions, check_output};
 use crate::mesh::SinkStats;
 use crate::monitor::{Counter, Monitor};
-use crate::octree::{BrickKey, Domain, Flips, SnapBox};
+use crate::octree::{BrickKey, Domain, DropRecord, Flips, SnapBox};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::run::Run;
@@ -29,6 +29,8 @@ pub struct Findings {
     soup: Option<SoupFacts>,
     domain: Option<Domain>,
     pub measure: SoupMeasure,
+    /// Copies that are in no bin.
+    left_out: LeftOut,
     /// Bricks that triangles touch.
     pub bins: u64,
     pub settle: SettleStats,
@@ -149,6 +151,7 @@ impl Run<'_> {
         let (bins, measure) = fill_bins(&soup, findings.domain(), resources)?;
         findings.measure = measure;
         findings.bins = bins.entries.len();
+        findings.left_out = bins.left_out;
         if measure.area == 0.0 {
             return Err(self.no_triangle(findings));
         }
@@ -327,7 +330,7 @@ fn settle_copies(
     findings: &mut Findings,
     resources: &Resources,
 ) -> Result<Vec<FileState>, RepairError> {
-    let bins = Bins::open(resources, &workspace.files())?;
+    let bins = Bins::open(resources, &workspace.files(), findings.left_out)?;
     let triangles = findings.soup().stats.triangles;
     let settled = settle(&bins, findings.domain(), triangles, resources)?;
     findings.settle = settled.stats;
@@ -341,10 +344,11 @@ fn scan_bins(
     resources: &Resources,
 ) -> Result<Vec<FileState>, RepairError> {
     let files = workspace.files();
-    let bins = Bins::open(resources, &files)?;
+    let bins = Bins::open(resources, &files, findings.left_out)?;
     let settled = Settled::open(resources, &files, findings.settle)?;
     let mut items = ScanItems::new(&bins, &settled);
-    let (hits, stats) = scan(&bins.triangles, || items.next(), findings.domain(), resources)?;
+    let (triangles, drops) = (&bins.triangles, &settled.drops);
+    let (hits, stats) = scan(triangles, drops, || items.next(), findings.domain(), resources)?;
     findings.scan = stats;
     Ok(hand_on(hits, &mut handles.hits))
 }
@@ -387,16 +391,20 @@ pub fn is_about_nesting(failure: &Failure) -> bool {
 struct ScanItems<'b> {
     bins: SpoolPeek<'b, BinEntry>,
     drops: SpoolPeek<'b, DropRecord>,
+    next_drop: u64,
 }
 
 impl<'b> ScanItems<'b> {
     fn new(bins: &'b Bins, settled: &'b Settled) -> Self {
-        Self { bins: SpoolPeek::new(&bins.entries), drops: SpoolPeek::new(&settled.drops) }
+        let (bins, drops) = (SpoolPeek::new(&bins.entries), SpoolPeek::new(&settled.drops));
+        Self { bins, drops, next_drop: 0 }
     }
 
     fn next(&mut self) -> Result<Option<ScanItem>, StoreError> {
         let Some(BinEntry { brick, first, count }) = self.bins.next()? else { return Ok(None) };
-        let drops = self.drops.take_while(|drop| drop.brick == brick, |drop| drop.source)?;
+        let first_drop = self.next_drop;
+        self.next_drop += self.drops.skip_while(|drop| drop.brick == brick)?;
+        let drops = first_drop..self.next_drop;
         Ok(Some(ScanItem { brick: BrickKey(brick), first, count, drops }))
     }
 }

@@ -6,7 +6,8 @@
 //! Invariant:  every hit is decided exactly on the snapped corners, under one symbolic translation
 //!             of the whole grid; a soup that is closed mod 2 leaves no odd face.
 //! Units:      lattice units.
-//! Memory:     per worker one block of triangles, [`CHUNK_HITS`] hits and the brick under way.
+//! Memory:     per worker one block of triangles and of drops, [`CHUNK_HITS`] hits and the brick
+//!             under way.
 //! Fails:      only as [`StoreError`]; geometry cannot fail here.
 //! Source:     Ju 2004 (scan conversion of edges); parity in place of "was hit" is ours, as is the
 //!             translated grid (simulation of simplicity, Edelsbrunner and Mücke 1990).
@@ -16,13 +17,15 @@ mod convert;
 #[cfg(test)]
 mod oracle_tests;
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
 use crate::monitor::{Counter, Gauge, Resident};
-use crate::octree::{BrickKey, Domain, EdgeBits, HitBrick, SIDE, SoupTriangle, encode};
+use crate::octree::{BrickKey, Domain, DropRecord, EdgeBits, HitBrick, SIDE, SoupTriangle, encode};
 use crate::scan::collect::Collector;
 use crate::scan::convert::Converter;
-use crate::store::{BrickFile, BrickPass, Resources, Spool, StoreError, ordered};
+use crate::store::{BrickFile, BrickPass, Resources, Spool, SpoolPeek, StoreError, ordered};
 
 pub use collect::CHUNK_HITS;
 
@@ -40,8 +43,8 @@ pub struct ScanItem {
     pub first: u64,
     /// How many triangles.
     pub count: u64,
-    /// Source numbers to leave out, ascending.
-    pub drops: Vec<u32>,
+    /// Numbers of the drops that say which of them to leave out, by source number.
+    pub drops: Range<u64>,
 }
 
 /// Counts of scan conversion.
@@ -89,6 +92,7 @@ struct Scanned {
 /// The scratch disk fails, or the caller cancels.
 pub fn scan(
     triangles: &Spool<SoupTriangle>,
+    drops: &Spool<DropRecord>,
     mut items: impl FnMut() -> Result<Option<ScanItem>, StoreError>,
     domain: &Domain,
     resources: &Resources,
@@ -105,7 +109,7 @@ pub fn scan(
         || Workspace::new(domain),
         |space, item| {
             let _brick = bricks.hold(1);
-            space.scan_brick(triangles, &item, &resident)
+            space.scan_brick(triangles, drops, &item, &resident)
         },
         |scanned| {
             resources.monitor.count(Counter::TrianglesScanned, scanned.stats.triangles);
@@ -137,19 +141,22 @@ impl Workspace {
     fn scan_brick(
         &mut self,
         triangles: &Spool<SoupTriangle>,
+        drops: &Spool<DropRecord>,
         item: &ScanItem,
         resident: &Resident,
     ) -> Result<Scanned, StoreError> {
         self.converter.enter(item.brick);
         self.collector.clear();
         let mut stats = ScanStats::default();
-        let mut drops = item.drops.iter().peekable();
+        let drop_count = item.drops.end - item.drops.start;
+        let mut drops = SpoolPeek::range(drops, item.drops.start, drop_count);
         let mut reader = triangles.reader(item.first, item.count);
         while let Some(block) = reader.next_block()? {
             let _block = resident.hold(block.len());
             for triangle in block {
                 // Both lists ascend by source number.
-                if drops.next_if(|&&drop| drop == triangle.source).is_some() {
+                if drops.peek()?.is_some_and(|drop| drop.source == triangle.source) {
+                    drops.next()?;
                     continue;
                 }
                 stats.triangles += 1;

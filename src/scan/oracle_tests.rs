@@ -46,10 +46,11 @@ fn scanned<T>(soup: &[Corners], depth: u32, look: impl FnOnce(&BrickFile, &Domai
         brick: BrickKey(entry.brick),
         first: entry.first,
         count: entry.count,
-        drops: Vec::new(),
+        drops: 0..0,
     });
     let (bricks, _) =
-        scan(&bins.triangles, || Ok(items.next()), &domain, &resources).expect("room");
+        scan(&bins.triangles, &settled.drops, || Ok(items.next()), &domain, &resources)
+            .expect("room");
     look(&bricks, &domain)
 }
 

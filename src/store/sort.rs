@@ -27,7 +27,7 @@ pub trait Record: Pod + Send + Sync {
 /// Smallest read buffer of a run in a merge.
 const PAGE_BYTES: usize = 4096;
 /// Records of this size and more are sorted by their keys and moved once.
-const WIDE_BYTES: usize = 48;
+const WIDE_BYTES: usize = 64;
 /// Wide records are gathered into blocks of this size on their way to the disk.
 const GATHER_BYTES: usize = 64 << 10;
 

@@ -277,7 +277,13 @@ impl<'s, R: Pod> SpoolPeek<'s, R> {
     /// All of `spool`, from its first record.
     #[must_use]
     pub fn new(spool: &'s Spool<R>) -> Self {
-        Self { reader: spool.reader(0, spool.len()), at: 0 }
+        Self::range(spool, 0, spool.len())
+    }
+
+    /// The records `first..first + count` of `spool`.
+    #[must_use]
+    pub fn range(spool: &'s Spool<R>, first: u64, count: u64) -> Self {
+        Self { reader: spool.reader(first, count), at: 0 }
     }
 
     /// The next record, `None` at the end.
@@ -303,6 +309,19 @@ impl<'s, R: Pod> SpoolPeek<'s, R> {
         let record = self.peek()?;
         self.at += usize::from(record.is_some());
         Ok(record)
+    }
+
+    /// Passes over the records that come next and satisfy `belongs`; how many there were.
+    ///
+    /// # Errors
+    /// The disk fails.
+    pub fn skip_while(&mut self, belongs: impl Fn(&R) -> bool) -> Result<u64, StoreError> {
+        let mut skipped = 0;
+        while self.peek()?.as_ref().is_some_and(&belongs) {
+            self.at += 1;
+            skipped += 1;
+        }
+        Ok(skipped)
     }
 
     /// Takes the records that come next and satisfy `belongs`, as `value` of each.

@@ -40,6 +40,15 @@ pub fn closed_soups(depth: u32, seed: u64) -> Vec<Closed> {
     ]
 }
 
+/// A sphere, and another one that is pressed so flat that its two sides are one on the lattice.
+pub fn beside_a_fold() -> Vec<Corners> {
+    let mut fold = sphere([2.0, -0.2, 0.1], 0.8, 6);
+    fold.iter_mut().flatten().for_each(|corner| corner[1] = -0.2 + (corner[1] + 0.2) * 1e-12);
+    let mut soup = sphere([0.3, -0.2, 0.1], 1.0, 12);
+    soup.extend(fold);
+    soup
+}
+
 /// Moves all corners of a soup in the unit cube to multiples of `step` cells of the grid that it
 /// gets at `depth`; two specks hold the unit cube, and with it the grid, in place.
 pub fn on_grid(triangles: &[Corners], depth: u32, step: f64) -> Vec<Corners> {

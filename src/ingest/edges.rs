@@ -1,0 +1,123 @@
+//! Judges the edges of one bin: which are open, and what they say about groups of copies.
+//!
+//! In:      the uses of edges by triangles, by edge and group.
+//! Out:     open edges as counts; [`Fact`]s of edges with copies.
+//! Memory:  one edge is counted at a time, however many triangles meet it.
+
+use crate::ingest::duplicates::SettleStats;
+use crate::ingest::facts::{
+    Fact, JOINED, Outbox, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, RIM_ODD,
+};
+use crate::ingest::packed::{EdgeUse, NO_GROUP, NO_WIDTH, Point, unpack_ends};
+use crate::store::{Sorter, StoreError};
+
+/// The length of an edge in model units, for lattice units of `unit`.
+pub(crate) fn length_of(ends: [Point; 2], unit: f64) -> f64 {
+    let square: f64 =
+        (0..3).map(|a| f64::from(ends[0][a]) - f64::from(ends[1][a])).map(|d| d * d).sum();
+    square.sqrt() * unit
+}
+
+impl SettleStats {
+    /// Counts an edge that an odd number of triangles meets.
+    pub(crate) fn add_rim(&mut self, length: f64) {
+        self.rim_edges += 1;
+        self.rim_length += length;
+    }
+}
+
+/// The uses of one edge so far.
+struct Tally {
+    ends: [u64; 3],
+    /// The group whose uses come, and how many there were.
+    run: (u32, u64),
+    /// Even groups: the first and the last of them, and their number.
+    even: Option<(u32, u32)>,
+    even_count: u64,
+    /// All that is not in an even group; odd groups are one each.
+    others: u64,
+    /// The edges as given, cancelled in pairs.
+    given: u64,
+}
+
+impl Tally {
+    fn new(ends: [u64; 3]) -> Self {
+        Self { ends, run: (NO_GROUP, 0), even: None, even_count: 0, others: 0, given: 0 }
+    }
+
+    fn add(&mut self, edge: &EdgeUse, facts: &mut Outbox<Fact>) -> Result<(), StoreError> {
+        self.given ^= edge.given;
+        if self.run.0 != edge.group {
+            self.end_run(facts)?;
+            self.run = (edge.group, 0);
+        }
+        self.run.1 += 1;
+        Ok(())
+    }
+
+    fn end_run(&mut self, facts: &mut Outbox<Fact>) -> Result<(), StoreError> {
+        let (group, uses) = self.run;
+        match group {
+            NO_WIDTH => {}
+            NO_GROUP => self.others += uses,
+            _ if !uses.is_multiple_of(2) => self.others += 1,
+            _ => {
+                self.even_count += 1;
+                if let Some((_, last)) = self.even {
+                    facts.push(Fact { group: last, kind: JOINED, value: u64::from(group) })?;
+                }
+                self.even = Some((self.even.map_or(group, |(first, _)| first), group));
+            }
+        }
+        Ok(())
+    }
+
+    /// All uses are in.
+    fn finish(
+        mut self,
+        unit: f64,
+        facts: &mut Outbox<Fact>,
+        stats: &mut SettleStats,
+    ) -> Result<(), StoreError> {
+        self.end_run(facts)?;
+        let length = length_of(unpack_ends(self.ends), unit);
+        let others_are_even = self.others.is_multiple_of(2);
+        match self.even {
+            // On the patch's rim: whether the edge is open depends on what becomes of the patch.
+            Some((group, _)) if self.even_count % 2 == 1 => {
+                let kind = match (self.others, others_are_even) {
+                    (0, _) if self.given == 0 => RIM_ALONE_CLOSED,
+                    (0, _) => RIM_ALONE_OPEN,
+                    (_, true) => RIM_EVEN,
+                    (_, false) => RIM_ODD,
+                };
+                facts.push(Fact { group, kind, value: length.to_bits() })?;
+            }
+            _ if !others_are_even => stats.add_rim(length),
+            _ => {}
+        }
+        Ok(())
+    }
+}
+
+/// Goes through all uses of edges.
+pub(crate) fn judge_edges(
+    edges: Sorter<EdgeUse>,
+    unit: f64,
+    facts: &mut Outbox<Fact>,
+    stats: &mut SettleStats,
+) -> Result<(), StoreError> {
+    let mut sorted = edges.finish()?;
+    let mut open: Option<Tally> = None;
+    while let Some(edge) = sorted.next()? {
+        if open.as_ref().is_none_or(|tally| tally.ends != edge.ends)
+            && let Some(done) = open.replace(Tally::new(edge.ends))
+        {
+            done.finish(unit, facts, stats)?;
+        }
+        if let Some(tally) = &mut open {
+            tally.add(&edge, facts)?;
+        }
+    }
+    open.map_or(Ok(()), |done| done.finish(unit, facts, stats))
+}
