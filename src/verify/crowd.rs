@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::store::{Record, Scratch, Sorter, StoreError, Unite};
-use crate::verify::fans::{Corner, Visit};
+use crate::verify::fans::{Corner, Visit, most_wedges};
 use crate::verify::link::{Judgement, Spoke, Wedge, spokes};
 
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -37,8 +37,7 @@ pub(crate) fn judge_by_sorting(
     })?;
     outcome?;
     let mut sorted = sorter.finish()?;
-    // Classifying takes some forty bytes per wedge.
-    let most = (share_bytes / 4 / 40).max(64) as usize;
+    let most = most_wedges(share_bytes);
     let mut wedges: Vec<Wedge> = Vec::new();
     let mut next = sorted.next()?;
     while let Some(Corner { vertex, .. }) = next {

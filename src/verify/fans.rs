@@ -4,8 +4,8 @@
 //! Out:        a [`Judgement`] of all vertices.
 //! Invariant:  the result depends on the triangles alone, not on the share.
 //! Memory:     `share_bytes`. Vertices are cut into ranges whose wedges fit; one range is the
-//!             common case and needs no disk. A range that turns out too full is sorted
-//!             externally, and a vertex too large even for that is united externally.
+//!             common case and needs no disk. A range that turns out too full, or that has a vertex
+//!             with too many wedges, is sorted externally; such a vertex is united externally.
 //! Fails:      only as [`StoreError`].
 
 use bytemuck::{Pod, Zeroable};
@@ -55,7 +55,10 @@ pub(crate) fn judge_fans(
                 Ok(())
             })
         };
-        judge_range(&mut judgement, 0, space, &visit)?;
+        let most = most_wedges(share_bytes);
+        if !judge_range(&mut judgement, 0, space, most, &visit)? {
+            judge_by_sorting(&mut judgement, space, scratch, share_bytes, &visit)?;
+        }
         return Ok(judgement);
     }
     let ranges = Ranges::fill(tape, space, scratch, share_bytes / 4, needed, monitor)?;
@@ -64,9 +67,9 @@ pub(crate) fn judge_fans(
         let from = range as u64 * ranges.width;
         let width = ranges.width.min(space - from);
         let visit = |see: &mut dyn FnMut(Corner)| ranges.each(range, monitor, see);
-        if range_bytes(ranges.lists[range].corners, width) <= room_bytes {
-            judge_range(&mut judgement, from, width, &visit)?;
-        } else {
+        let fits = range_bytes(ranges.lists[range].corners, width) <= room_bytes;
+        let most = most_wedges(room_bytes);
+        if !fits || !judge_range(&mut judgement, from, width, most, &visit)? {
             judge_by_sorting(&mut judgement, space, scratch, room_bytes, &visit)?;
         }
     }
@@ -84,16 +87,26 @@ fn range_bytes(corners: u64, vertices: u64) -> u64 {
 /// A way to see all corners of a range, as often as needed.
 pub(crate) type Visit<'v> = dyn Fn(&mut dyn FnMut(Corner)) -> Result<(), StoreError> + 'v;
 
-/// Counting sort of a range's wedges by vertex, then a judgement each.
+/// Wedges of one vertex that are classified in memory, which takes some sixty bytes each.
+pub(crate) fn most_wedges(share_bytes: u64) -> usize {
+    (share_bytes / 4 / 60).max(64) as usize
+}
+
+/// Counting sort of a range's wedges by vertex, then a judgement each; `false`, and nothing done,
+/// when a vertex has more than `most` of them.
 fn judge_range(
     judgement: &mut Judgement,
     from: u64,
     width: u64,
+    most: usize,
     visit: &Visit<'_>,
-) -> Result<(), StoreError> {
+) -> Result<bool, StoreError> {
     let place = |corner: &Corner| (u64::from(corner.vertex) - from) as usize;
     let mut ends = vec![0_u32; width as usize];
     visit(&mut |corner| ends[place(&corner)] += 1)?;
+    if ends.iter().any(|&count| count as usize > most) {
+        return Ok(false);
+    }
     let mut total = 0_u32;
     for end in &mut ends {
         // Now the start of each vertex; filling moves it to its end.
@@ -110,10 +123,11 @@ fn judge_range(
         judgement.judge(vertex as u32, &mut wedges[start..end as usize])?;
         start = end as usize;
     }
-    Ok(())
+    Ok(true)
 }
 
-/// Corners in one file, in blocks of one range each.
+/// Corners in one file, in blocks of one range each. The blocks of a range are a chain: each begins
+/// with where the one before it lies. So memory does not grow with their number.
 struct Ranges {
     file: ScratchFile,
     width: u64,
@@ -121,12 +135,16 @@ struct Ranges {
     lists: Vec<BlockList>,
 }
 
-#[derive(Default)]
 struct BlockList {
     open: Vec<Corner>,
-    blocks: Vec<u64>,
+    /// Where the last block lies, or [`NO_BLOCK`].
+    last: u64,
     corners: u64,
 }
+
+const NO_BLOCK: u64 = u64::MAX;
+/// Bytes before the corners of a block.
+const LINK_BYTES: u64 = size_of::<u64>() as u64;
 
 impl Ranges {
     /// Writes all corners of the tape; `needed` is the memory that one range would take.
@@ -144,7 +162,8 @@ impl Ranges {
         let count = wanted.min((share_bytes / 512).max(1)).min(space.max(1));
         let block_corners = (share_bytes / count / corner_bytes).clamp(16, 4096) as usize;
         let width = space.div_ceil(count).max(1);
-        let lists = (0..space.div_ceil(width)).map(|_| BlockList::default()).collect();
+        let empty = || BlockList { open: Vec::new(), last: NO_BLOCK, corners: 0 };
+        let lists = (0..space.div_ceil(width)).map(|_| empty()).collect();
         let file = scratch.anonymous("fans")?;
         let mut ranges = Self { file, width, block_corners, lists };
         let mut end = 0;
@@ -158,9 +177,10 @@ impl Ranges {
         let list = &mut self.lists[(u64::from(corner.vertex) / self.width) as usize];
         if list.open.len() == self.block_corners {
             let bytes: &[u8] = bytemuck::cast_slice(&list.open);
-            self.file.write_at(bytes, *end)?;
-            list.blocks.push(*end);
-            *end += bytes.len() as u64;
+            self.file.write_at(&list.last.to_le_bytes(), *end)?;
+            self.file.write_at(bytes, *end + LINK_BYTES)?;
+            list.last = *end;
+            *end += LINK_BYTES + bytes.len() as u64;
             list.open.clear();
         }
         if list.open.capacity() == 0 {
@@ -171,6 +191,7 @@ impl Ranges {
         Ok(())
     }
 
+    /// Shows all corners of a range, in no order that means anything.
     fn each(
         &self,
         range: usize,
@@ -179,12 +200,17 @@ impl Ranges {
     ) -> Result<(), StoreError> {
         let list = &self.lists[range];
         let mut block = vec![Corner::zeroed(); self.block_corners];
-        for &offset in &list.blocks {
+        let mut at = list.last;
+        while at != NO_BLOCK {
             if monitor.cancelled() {
                 return Err(StoreError::Cancelled);
             }
-            self.file.read_at(bytemuck::cast_slice_mut(&mut block), offset)?;
+            let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut block);
+            self.file.read_at(bytes, at + LINK_BYTES)?;
+            let mut link = [0; LINK_BYTES as usize];
+            self.file.read_at(&mut link, at)?;
             block.iter().copied().for_each(&mut *see);
+            at = u64::from_le_bytes(link);
         }
         list.open.iter().copied().for_each(see);
         Ok(())

@@ -22,6 +22,9 @@ use crate::verify::slots::{Name, Slots, mix};
 
 /// Wedges that have room beside their vertex; more are rare.
 const FEW: usize = 12;
+/// What a wedge beyond these takes: a vector that doubles, again when its round is closed, and a
+/// share of the map.
+const CROWD_WEDGE_BYTES: u64 = 6 * size_of::<Wedge>() as u64;
 const NO_BODY: BodyId = BodyId::MAX;
 
 /// A vertex under way.
@@ -191,11 +194,11 @@ impl<N: Name> Window<N> {
         let fan = &self.fans[slot as usize];
         let crowd = self.crowds.entry(slot).or_default();
         crowd.push(wedge);
-        self.crowd_bytes += 2 * size_of::<Wedge>() as u64;
+        self.crowd_bytes += CROWD_WEDGE_BYTES;
         if fan.balance != 0 {
             return !self.is_full();
         }
-        self.crowd_bytes -= (2 * crowd.len() * size_of::<Wedge>()) as u64;
+        self.crowd_bytes -= crowd.len() as u64 * CROWD_WEDGE_BYTES;
         let wedges = &mut self.scratch_wedges;
         wedges.clear();
         wedges.extend_from_slice(&fan.wedges);
