@@ -7,7 +7,7 @@ use crate::contour::mdc::table::edge_at_corner;
 use crate::contour::mdc::triangulate::{Cut, Quad};
 use crate::contour::mdc::{cell_mask, cell_number, components_of};
 use crate::contour::{ContourError, ContourStats};
-use crate::octree::{BrickKey, Domain, SIDE, decode_cells};
+use crate::octree::{ArchivedCellBrick, BrickKey, Domain, SIDE, decode_cells};
 use crate::store::BrickFile;
 
 /// The triangles of one brick.
@@ -52,6 +52,35 @@ pub struct Polygons<'p> {
 /// No cell of the brick has this rank: the list has at most 32768.
 const NO_RANK: u16 = u16::MAX;
 
+/// Cells from one to the next along the axes that are set.
+const STEPS: [usize; 8] = {
+    let mut steps = [0; 8];
+    let mut axes = 0;
+    while axes < 8 {
+        steps[axes] = (axes & 1) + SIDE * (axes >> 1 & 1) + SIDE * SIDE * (axes >> 2);
+        axes += 1;
+    }
+    steps
+};
+
+/// The four cells around the lower edge of a cell along each axis: the axes along which each lies
+/// one step down, and the number of the edge there.
+const AROUND: [[(u8, u8); 4]; 3] = {
+    let mut around = [[(0, 0); 4]; 3];
+    let mut axis = 0;
+    while axis < 3 {
+        let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+        let downs = [u | v, v, 0, u];
+        let mut slot = 0;
+        while slot < 4 {
+            around[axis][slot] = (downs[slot], edge_at_corner(downs[slot], axis as u8));
+            slot += 1;
+        }
+        axis += 1;
+    }
+    around
+};
+
 /// What is needed of a brick to look up its vertices: all of the own one, of a neighbour the cells
 /// on the sides where it touches.
 struct Loaded {
@@ -86,7 +115,15 @@ impl<'p> Polygons<'p> {
     /// Loads brick `number`, which lies one step down along the axes set in `beyond`.
     fn load(&self, number: usize, beyond: u32) -> Result<Loaded, ContourError> {
         let view = self.cells.view(number)?;
-        let record = decode_cells(&view)?;
+        self.load_from(decode_cells(&view)?, number, beyond)
+    }
+
+    fn load_from(
+        &self,
+        record: &ArchivedCellBrick,
+        number: usize,
+        beyond: u32,
+    ) -> Result<Loaded, ContourError> {
         let side = self.domain.brick_units() as i32;
         let shift: [i32; 3] = std::array::from_fn(|a| (beyond >> a & 1) as i32 * side);
         let mut loaded = Loaded { cells: Vec::new(), firsts: Vec::new(), positions: Vec::new() };
@@ -117,9 +154,9 @@ impl<'p> Polygons<'p> {
     /// [`ContourError`]: a neighbour is missing, which sound bricks never miss.
     pub fn triangles(&mut self, number: usize) -> Result<BrickTriangles, ContourError> {
         let key = BrickKey(self.cells.directory()[number].key);
-        let own = self.load(number, 0)?;
         let view = self.cells.view(number)?;
         let record = decode_cells(&view)?;
+        let own = self.load_from(record, number, 0)?;
         self.ranks.fill(NO_RANK);
         for (rank, cell) in record.cells.iter().enumerate() {
             self.ranks[cell_number(cell.to_native())] = rank as u16;
@@ -127,6 +164,7 @@ impl<'p> Polygons<'p> {
         let mut bricks: [Option<Loaded>; 8] = [const { None }; 8];
         bricks[0] = Some(own);
         let mut out = BrickTriangles::default();
+        out.indices.reserve(2 * record.offsets.len());
         let mut offsets = record.offsets.iter();
         for cell in record.cells.iter() {
             let cell = cell.to_native();
@@ -150,6 +188,7 @@ impl<'p> Polygons<'p> {
     }
 
     /// The four vertices around the edge along `axis` from the min corner of cell `at`.
+    #[inline]
     fn ring(
         &self,
         bricks: &mut [Option<Loaded>; 8],
@@ -157,32 +196,26 @@ impl<'p> Polygons<'p> {
         at: [usize; 3],
         axis: usize,
     ) -> Result<[Vertex; 4], ContourError> {
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+        let here = at[0] + SIDE * (at[1] + SIDE * at[2]);
+        let low = (0..3).fold(0, |low, a| low | u8::from(at[a] == 0) << a);
         let mut ring = [Vertex { number: 0, position: [0; 3] }; 4];
-        for (slot, (down_u, down_v)) in
-            [(true, true), (false, true), (false, false), (true, false)].into_iter().enumerate()
-        {
-            let (mut cell, mut beyond, mut corner) = (at, 0, 0_u8);
-            for (down, a) in [(down_u, u), (down_v, v)] {
-                if down {
-                    corner |= 1 << a;
-                    beyond |= u32::from(cell[a] == 0) << a;
-                    cell[a] = if cell[a] == 0 { SIDE - 1 } else { cell[a] - 1 };
-                }
-            }
-            let edge = edge_at_corner(corner, axis as u8);
-            ring[slot] = self.vertex(bricks, key, beyond, cell, edge)?;
+        for (vertex, (down, edge)) in ring.iter_mut().zip(AROUND[axis]) {
+            let beyond = down & low;
+            let cell =
+                here + (SIDE - 1) * STEPS[usize::from(beyond)] - STEPS[usize::from(down & !beyond)];
+            *vertex = self.vertex(bricks, key, u32::from(beyond), cell, edge)?;
         }
         Ok(ring)
     }
 
-    /// The vertex of the component that `edge` belongs to in a cell of the brick `beyond`.
+    /// The vertex of the component that `edge` belongs to in cell `number` of the brick `beyond`.
+    #[inline]
     fn vertex(
         &self,
         bricks: &mut [Option<Loaded>; 8],
         key: BrickKey,
         beyond: u32,
-        cell: [usize; 3],
+        number: usize,
         edge: u8,
     ) -> Result<Vertex, ContourError> {
         let missing = || ContourError::Contradiction {
@@ -195,7 +228,6 @@ impl<'p> Polygons<'p> {
             *slot = Some(self.load(self.cells.find(neighbour.0).ok_or_else(missing)?, beyond)?);
         }
         let brick = slot.as_ref().ok_or_else(missing)?;
-        let number = cell[0] + SIDE * (cell[1] + SIDE * cell[2]);
         let rank = if beyond == 0 {
             Some(usize::from(self.ranks[number])).filter(|&rank| rank != usize::from(NO_RANK))
         } else {

@@ -11,7 +11,9 @@ use glam::DVec3;
 use crate::contour::mdc::table::{NO_FACE, TWO_SIDED, axis_of_edge, corner_of_edge};
 use crate::contour::mdc::{FLIPPED_BIT, components_of};
 use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats};
-use crate::geom::qef::{Hit, QefOptions, solve};
+use crate::geom::qef::{
+    Attempt, Hit, QefOptions, Waiting, begin, solve, solve_flat, solve_together,
+};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS, SIDE,
@@ -69,8 +71,50 @@ pub fn place_vertices(
 struct EdgeCrossing {
     /// Share of the edge.
     offset: f64,
-    /// Unit normal; zero on patches.
-    normal: DVec3,
+    /// Number of its unit normal; 0, which is none, on patches.
+    normal: u32,
+}
+
+/// Vertices that are placed together: enough to hide how long a root takes.
+const TOGETHER: usize = 4;
+
+/// Cells whose vertices wait until there are enough of them, at the end of a brick or before.
+#[derive(Default)]
+struct WaitingCells {
+    count: usize,
+    cells: [Waiting; TOGETHER],
+    /// The cell, and the number of its vertex.
+    places: [([usize; 3], usize); TOGETHER],
+}
+
+/// Crossings of one cell: places about its centre, in cells, and numbers of normals.
+struct Around {
+    count: usize,
+    points: [DVec3; 12],
+    normals: [u32; 12],
+}
+
+impl Around {
+    fn points(&self) -> &[DVec3] {
+        &self.points[..self.count]
+    }
+
+    /// The one normal of all crossings.
+    #[inline]
+    fn flat_normal(&self) -> Option<u32> {
+        let normals = &self.normals[..self.count];
+        normals.iter().all(|normal| *normal == normals[0]).then_some(normals[0])
+    }
+
+    /// The first `count` of these.
+    #[inline]
+    fn hits(&self, normals: &[DVec3]) -> [Hit; 12] {
+        let mut hits = [Hit { point: DVec3::ZERO, normal: DVec3::ZERO }; 12];
+        for (i, hit) in hits[..self.count].iter_mut().enumerate() {
+            *hit = Hit { point: self.points[i], normal: normals[self.normals[i] as usize] };
+        }
+        hits
+    }
 }
 
 struct Workspace {
@@ -81,6 +125,9 @@ struct Workspace {
     /// First crossing of each row of edges.
     row_starts: Vec<u32>,
     crossings: Vec<EdgeCrossing>,
+    planes: Vec<SourcePlane>,
+    normals: Vec<DVec3>,
+    waiting: WaitingCells,
     /// Corner signs of bricks beyond a side, for faces that two bricks must agree on.
     beyond: HashMap<u64, CornerBits>,
 }
@@ -97,6 +144,9 @@ impl Workspace {
             signs: CornerBits::default(),
             row_starts: vec![0; 3 * ROWS],
             crossings: Vec::new(),
+            planes: Vec::new(),
+            normals: Vec::new(),
+            waiting: WaitingCells::default(),
             beyond: HashMap::new(),
         }
     }
@@ -119,6 +169,7 @@ impl Workspace {
                 }
             }
         }
+        self.place_waiting(&mut brick, &mut stats);
         Ok(Placed { key, bytes: encode(&brick), stats })
     }
 
@@ -128,7 +179,11 @@ impl Workspace {
         self.crossings.clear();
         let mut row = 0;
         let cell_units = self.cell_units as f64;
-        let planes: Vec<SourcePlane> = record.planes.iter().map(SourcePlane::from).collect();
+        self.planes.clear();
+        self.planes.extend(record.planes.iter().map(SourcePlane::from));
+        self.normals.clear();
+        self.normals.push(DVec3::ZERO);
+        self.normals.extend(self.planes.iter().map(SourcePlane::unit_normal));
         for crossing in record.crossings.iter() {
             let (edge, plane) = (crossing.edge.to_native(), crossing.plane.to_native());
             self.marks.set(edge);
@@ -139,12 +194,11 @@ impl Workspace {
             }
             self.crossings.push(if plane & PATCH == 0 {
                 let (axis, at) = edge_position(edge);
-                let plane = &planes[plane as usize];
-                let offset = plane.offset_on_edge(axis, at, cell_units);
-                EdgeCrossing { offset, normal: plane.unit_normal() }
+                let offset = self.planes[plane as usize].offset_on_edge(axis, at, cell_units);
+                EdgeCrossing { offset, normal: plane + 1 }
             } else {
                 let offset = f64::from(plane & 0xffff) / 65536.0;
-                EdgeCrossing { offset, normal: DVec3::ZERO }
+                EdgeCrossing { offset, normal: 0 }
             });
         }
         self.row_starts[row..].fill(self.crossings.len() as u32);
@@ -175,14 +229,11 @@ impl Workspace {
             stats.flipped_faces += 1;
         }
         let components = components_of(cell);
-        let first = brick.positions.len();
-        for component in 0..components.count {
-            let edges = components.edge_masks[usize::from(component)];
-            let alone = components.count == 1;
-            let taken = &brick.positions[first..];
-            let (position, clamped) = self.place_component(at, edges, alone, taken);
-            brick.positions.push(position);
-            stats.clamped_vertices += u64::from(clamped);
+        if components.count == 1 {
+            self.place_alone(at, components.edge_masks[0], brick, stats);
+        } else {
+            let masks = &components.edge_masks[..usize::from(components.count)];
+            self.place_apart(at, masks, brick, stats);
         }
         for axis in 0..3 {
             if (mask ^ mask >> (1 << axis)) & 1 == 1 {
@@ -249,17 +300,82 @@ impl Workspace {
         Ok(mask)
     }
 
-    /// The vertex of one component, in units from the brick's min corner; whether it was clamped.
-    fn place_component(
-        &self,
+    /// The vertex of the only component of a cell, now or with others that wait.
+    fn place_alone(
+        &mut self,
         at: [usize; 3],
         edges: u16,
-        alone: bool,
-        taken: &[[i32; 3]],
-    ) -> ([i32; 3], bool) {
-        let mut hits = [Hit { point: DVec3::ZERO, normal: DVec3::ZERO }; 12];
-        let mut count = 0;
-        let mut outward = DVec3::ZERO;
+        brick: &mut CellBrick,
+        stats: &mut ContourStats,
+    ) {
+        let around = self.around(at, edges);
+        let attempt = match around.flat_normal() {
+            Some(normal) => {
+                let normal = self.normals[normal as usize];
+                solve_flat(around.points(), normal, &self.qef).map(Attempt::Done)
+            }
+            None => None,
+        };
+        let attempt = attempt.unwrap_or_else(|| {
+            let hits = around.hits(&self.normals);
+            begin(&hits[..around.count], &self.qef)
+        });
+        match attempt {
+            Attempt::Done(solution) => {
+                brick.positions.push(self.to_lattice(at, solution.position));
+                stats.clamped_vertices += u64::from(solution.clamped);
+            }
+            Attempt::Waiting(cell) => {
+                let waiting = &mut self.waiting;
+                waiting.cells[waiting.count] = cell;
+                waiting.places[waiting.count] = (at, brick.positions.len());
+                waiting.count += 1;
+                brick.positions.push([0; 3]);
+                if self.waiting.count == TOGETHER {
+                    self.place_waiting(brick, stats);
+                }
+            }
+        }
+    }
+
+    fn place_waiting(&mut self, brick: &mut CellBrick, stats: &mut ContourStats) {
+        if self.waiting.count == 0 {
+            return;
+        }
+        let solutions = solve_together(&self.waiting.cells, &self.qef);
+        let places = self.waiting.places[..self.waiting.count].iter();
+        for (&(at, number), solution) in places.zip(solutions) {
+            brick.positions[number] = self.to_lattice(at, solution.position);
+            stats.clamped_vertices += u64::from(solution.clamped);
+        }
+        self.waiting.count = 0;
+    }
+
+    /// The vertices of a cell with several components.
+    fn place_apart(
+        &self,
+        at: [usize; 3],
+        edge_masks: &[u16],
+        brick: &mut CellBrick,
+        stats: &mut ContourStats,
+    ) {
+        let first = brick.positions.len();
+        for &edges in edge_masks {
+            let around = self.around(at, edges);
+            let hits = &around.hits(&self.normals)[..around.count];
+            let solution = solve(hits, &self.within_crossings(hits));
+            let position = self.to_lattice(at, solution.position);
+            let outward = hits.iter().fold(DVec3::ZERO, |sum, hit| sum + hit.normal);
+            let position = self.apart_from(position, at, outward, &brick.positions[first..]);
+            brick.positions.push(position);
+            stats.clamped_vertices += u64::from(solution.clamped);
+        }
+    }
+
+    /// The crossings on these edges of a cell.
+    #[inline]
+    fn around(&self, at: [usize; 3], edges: u16) -> Around {
+        let mut around = Around { count: 0, points: [DVec3::ZERO; 12], normals: [0; 12] };
         let mut left = edges;
         while left != 0 {
             let edge = left.trailing_zeros() as u8;
@@ -270,15 +386,11 @@ impl Workspace {
             let crossing = self.crossing(axis, [0, 1, 2].map(|a| at[a] + corner[a]));
             let mut point = DVec3::from(corner.map(|c| c as f64 - 0.5));
             point[axis] = crossing.offset - 0.5;
-            hits[count] = Hit { point, normal: crossing.normal };
-            outward += crossing.normal;
-            count += 1;
+            around.points[around.count] = point;
+            around.normals[around.count] = crossing.normal;
+            around.count += 1;
         }
-        let hits = &hits[..count];
-        let solution =
-            if alone { solve(hits, &self.qef) } else { solve(hits, &self.within_crossings(hits)) };
-        let position = self.to_lattice(at, solution.position);
-        (self.apart_from(position, at, outward, taken), solution.clamped)
+        around
     }
 
     /// Where several components share a cell, each stays in the box of its own crossings: there

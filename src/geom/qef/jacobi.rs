@@ -41,23 +41,39 @@ pub(crate) struct Spectrum {
 impl Spectrum {
     /// Decomposes `a` by cyclic rotations.
     pub(crate) fn of(a: &Symmetric) -> Self {
-        let mut m = [[a[0], a[1], a[2]], [a[1], a[3], a[4]], [a[2], a[4], a[5]]];
-        let mut v = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
-        let limit = OFF_DIAGONAL * trace(a);
+        let [spectrum] = Self::of_all(&[*a]);
+        spectrum
+    }
+
+    /// Decomposes all, each as if it were alone: a rotation is a chain of two roots and two
+    /// quotients, and several chains side by side take hardly longer than one.
+    pub(crate) fn of_all<const N: usize>(all: &[Symmetric; N]) -> [Self; N] {
+        let lanes = |i: usize| std::array::from_fn(|lane| all[lane][i]);
+        let [xx, xy, xz, yy, yz, zz] = [0, 1, 2, 3, 4, 5].map(lanes);
+        let mut m = [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]];
+        let (zero, one) = ([0.0; N], [1.0; N]);
+        let mut v = [[one, zero, zero], [zero, one, zero], [zero, zero, one]];
+        let limit: [f64; N] = std::array::from_fn(|lane| OFF_DIAGONAL * trace(&all[lane]));
         for _ in 0..SWEEPS_MAX {
-            if m[0][1].abs() + m[0][2].abs() + m[1][2].abs() <= limit {
+            let done = std::array::from_fn(|lane| {
+                let [xy, xz, yz] = [m[0][1][lane], m[0][2][lane], m[1][2][lane]];
+                xy.abs() + xz.abs() + yz.abs() <= limit[lane]
+            });
+            if done == [true; N] {
                 break;
             }
-            rotate::<0, 1, 2>(&mut m, &mut v);
-            rotate::<0, 2, 1>(&mut m, &mut v);
-            rotate::<1, 2, 0>(&mut m, &mut v);
+            rotate::<0, 1, 2, N>(&mut m, &mut v, &done);
+            rotate::<0, 2, 1, N>(&mut m, &mut v, &done);
+            rotate::<1, 2, 0, N>(&mut m, &mut v, &done);
         }
-        let mut order = [0, 1, 2];
-        order.sort_by(|&i, &j| m[j][j].total_cmp(&m[i][i]));
-        Self {
-            values: order.map(|i| m[i][i]),
-            vectors: order.map(|i| DVec3::new(v[0][i], v[1][i], v[2][i])),
-        }
+        std::array::from_fn(|lane| {
+            let mut order = [0, 1, 2];
+            order.sort_by(|&i, &j| m[j][j][lane].total_cmp(&m[i][i][lane]));
+            Self {
+                values: order.map(|i| m[i][i][lane]),
+                vectors: order.map(|i| DVec3::new(v[0][i][lane], v[1][i][lane], v[2][i][lane])),
+            }
+        })
     }
 
     /// How many eigenvalues are above `cutoff` times the largest.
@@ -89,35 +105,52 @@ impl Spectrum {
     }
 }
 
-/// Zeroes the element `P`, `Q`; `R` is the third index.
-fn rotate<const P: usize, const Q: usize, const R: usize>(
-    m: &mut [[f64; 3]; 3],
-    v: &mut [[f64; 3]; 3],
+/// One number of each matrix.
+type Lanes<const N: usize> = [f64; N];
+
+/// Zeroes the element `P`, `Q` of the matrices that are not done; `R` is the third index.
+#[inline]
+fn rotate<const P: usize, const Q: usize, const R: usize, const N: usize>(
+    m: &mut [[Lanes<N>; 3]; 3],
+    v: &mut [[Lanes<N>; 3]; 3],
+    done: &[bool; N],
 ) {
-    let off = m[P][Q];
-    if off == 0.0 {
-        return;
+    let (mut c, mut s) = ([1.0; N], [0.0; N]);
+    for lane in 0..N {
+        let off = m[P][Q][lane];
+        // The smaller root of t² + 2θt - 1, without the quotient θ, which can overflow.
+        let half = 0.5 * (m[Q][Q][lane] - m[P][P][lane]);
+        let root = (half * half + off * off).sqrt();
+        let t = off / if half >= 0.0 { half + root } else { half - root };
+        // A matrix that is done, or has its zero already, turns by nothing.
+        let t = if done[lane] || off == 0.0 { 0.0 } else { t };
+        c[lane] = 1.0 / (t * t + 1.0).sqrt();
+        s[lane] = t * c[lane];
+        m[P][P][lane] -= t * off;
+        m[Q][Q][lane] += t * off;
+        m[P][Q][lane] = if done[lane] { off } else { 0.0 };
     }
-    // The smaller root of t² + 2θt - 1, without the quotient θ, which can overflow.
-    let half = 0.5 * (m[Q][Q] - m[P][P]);
-    let root = (half * half + off * off).sqrt();
-    let t = if half >= 0.0 { off / (half + root) } else { off / (half - root) };
-    let c = 1.0 / (t * t + 1.0).sqrt();
-    let s = t * c;
-    m[P][P] -= t * off;
-    m[Q][Q] += t * off;
-    m[P][Q] = 0.0;
-    m[Q][P] = 0.0;
-    let (p, q) = (m[P][R], m[Q][R]);
-    m[P][R] = c * p - s * q;
-    m[R][P] = m[P][R];
-    m[Q][R] = s * p + c * q;
-    m[R][Q] = m[Q][R];
+    m[Q][P] = m[P][Q];
+    turn(&c, &s, m[P][R], m[Q][R], |p, q| (m[P][R], m[Q][R]) = (p, q));
+    (m[R][P], m[R][Q]) = (m[P][R], m[Q][R]);
     for row in v {
-        let (p, q) = (row[P], row[Q]);
-        row[P] = c * p - s * q;
-        row[Q] = s * p + c * q;
+        turn(&c, &s, row[P], row[Q], |p, q| (row[P], row[Q]) = (p, q));
     }
+}
+
+#[inline]
+fn turn<const N: usize>(
+    c: &Lanes<N>,
+    s: &Lanes<N>,
+    mut p: Lanes<N>,
+    mut q: Lanes<N>,
+    put: impl FnOnce(Lanes<N>, Lanes<N>),
+) {
+    for lane in 0..N {
+        (p[lane], q[lane]) =
+            (c[lane] * p[lane] - s[lane] * q[lane], s[lane] * p[lane] + c[lane] * q[lane]);
+    }
+    put(p, q);
 }
 
 #[cfg(test)]
@@ -152,6 +185,19 @@ mod tests {
                 let dot = spectrum.vectors[i].dot(spectrum.vectors[j]);
                 prop_assert!((dot - f64::from(u8::from(i == j))).abs() < 1e-14);
             }
+        }
+    }
+
+    #[test]
+    fn matrices_side_by_side_are_as_if_alone() {
+        let all = [
+            [1.0, 0.25, -0.5, 3.0, 0.125, 2.0],
+            [0.0; 6],
+            [1.0, 0.0, 0.0, 3.0, 0.0, 2.0],
+            [1.0, 1e-3, 1e-5, 1e-6, 1e-8, 1e-9],
+        ];
+        for (alone, together) in all.iter().map(Spectrum::of).zip(Spectrum::of_all(&all)) {
+            assert_eq!((alone.values, alone.vectors), (together.values, together.vectors));
         }
     }
 

@@ -33,7 +33,7 @@ pub(crate) struct Bundle {
     /// Distinct normals; 4 stands for more than three.
     pub(crate) normals: u8,
     /// The coordinate of all planes across an axis, NaN if there is none or they differ.
-    exact: DVec3,
+    pub(crate) exact: DVec3,
     groups: [Group; 3],
 }
 
@@ -83,15 +83,40 @@ impl Bundle {
         }
     }
 
-    /// Puts the axis-parallel planes' own coordinates in the place of rounded ones.
+    /// Gathers points whose normals are all the same; `None` if it cannot be used.
     #[inline]
-    pub(crate) fn with_exact_coordinates(&self, at: DVec3) -> DVec3 {
-        DVec3::select(self.exact.is_nan_mask(), at, self.exact)
+    pub(crate) fn flat(points: &[DVec3], normal: DVec3) -> Option<Self> {
+        if !is_usable(normal) {
+            return None;
+        }
+        let mut sum = DVec3::ZERO;
+        let mut planes = [AxisPlanes::default(); 3];
+        for &point in points {
+            sum += point;
+            note_axis_plane(&mut planes, &Hit { point, normal });
+        }
+        let count = points.len() as f64;
+        let mut groups = [Group::default(); 3];
+        groups[0] = Group { normal, points: sum, count };
+        let exact = DVec3::from_array(planes.map(AxisPlanes::coordinate));
+        Some(Self { mass_point: sum / count, normals: 1, exact, groups })
     }
 
-    /// The vertex on the planes nearest to the mass point, `None` if they do not pass the cut.
+    /// See [`with_exact_coordinates`].
     #[inline]
-    pub(crate) fn closed_form(&self, options: &QefOptions) -> Option<DVec3> {
+    pub(crate) fn with_exact_coordinates(&self, at: DVec3) -> DVec3 {
+        with_exact_coordinates(self.exact, at)
+    }
+
+    /// The vertex on the planes nearest to the mass point, and its rank; `None` if they do not
+    /// pass the cut.
+    #[inline]
+    pub(crate) fn closed_form(&self, options: &QefOptions) -> Option<(DVec3, u8)> {
+        self.on_planes(options).map(|at| (at, self.normals))
+    }
+
+    #[inline]
+    fn on_planes(&self, options: &QefOptions) -> Option<DVec3> {
         let [a, b, c] = &self.groups;
         let m = self.mass_point;
         match self.normals {
@@ -138,6 +163,12 @@ impl Bundle {
         let moved = bc * a.offset(m) + ca * b.offset(m) + ab * c.offset(m);
         Some(m + moved / volume)
     }
+}
+
+/// Puts the axis-parallel planes' own coordinates in the place of rounded ones.
+#[inline]
+pub(crate) fn with_exact_coordinates(exact: DVec3, at: DVec3) -> DVec3 {
+    DVec3::select(exact.is_nan_mask(), at, exact)
 }
 
 impl Group {

@@ -3,7 +3,7 @@
 use crate::geom::qef::bounded::minimise;
 use crate::geom::qef::jacobi::Spectrum;
 use crate::geom::qef::ldl;
-use crate::geom::qef::planes::{Bundle, is_full_rank, is_usable};
+use crate::geom::qef::planes::{Bundle, is_full_rank, is_usable, with_exact_coordinates};
 use crate::geom::qef::{Hit, Path, Qef, QefOptions, Solution};
 use glam::DVec3;
 
@@ -12,60 +12,95 @@ use glam::DVec3;
 /// Always finite and inside the box of `options`: contradictory, missing and broken hits included.
 #[must_use]
 pub fn solve(hits: &[Hit], options: &QefOptions) -> Solution {
-    let bundle = Bundle::gather(hits);
-    let path = match bundle.normals {
-        0 => Path::Mass,
-        1 => Path::Plane,
-        2 => Path::TwoPlanes,
-        3 => Path::ThreePlanes,
-        _ => Path::Ldl,
-    };
-    if let Some((free, rank)) = free_solution(hits, &bundle, path, options) {
-        let position = bundle.with_exact_coordinates(free);
-        if contains(options, position) {
-            return Solution { position, rank, path, clamped: false };
+    match begin(hits, options) {
+        Attempt::Done(solution) => solution,
+        Attempt::Waiting(cell) => {
+            let [solution] = solve_together(&[cell], options);
+            solution
         }
     }
-    by_spectrum(hits, &bundle, path, options)
 }
 
-/// The solution of one cheap path, without the box; `None` where it would not be the truncated one.
+/// What the cheap paths say.
+#[derive(Clone, Copy, Debug)]
+pub enum Attempt {
+    /// The solution.
+    Done(Solution),
+    /// Nothing: the cell waits for [`solve_together`].
+    Waiting(Waiting),
+}
+
+/// A cell that needs its eigenvalues.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Waiting {
+    qef: Qef,
+    exact: DVec3,
+    has_normals: bool,
+}
+
+/// Tries the cheap paths. What waits is solved several at a time, faster than one by one.
 #[inline]
-fn free_solution(
-    hits: &[Hit],
-    bundle: &Bundle,
-    path: Path,
-    options: &QefOptions,
-) -> Option<(DVec3, u8)> {
-    match path {
-        Path::Mass => Some((bundle.mass_point, 0)),
-        Path::Ldl => {
-            let qef = accumulate(hits);
-            if !is_full_rank(&qef.ata, options.cutoff()) {
-                return None;
-            }
-            let m = bundle.mass_point;
-            Some((m + ldl::solve(&qef.ata, qef.residual(m)), 3))
+#[must_use]
+pub fn begin(hits: &[Hit], options: &QefOptions) -> Attempt {
+    let bundle = Bundle::gather(hits);
+    let mut qef = None;
+    let (path, free) = match bundle.normals {
+        0 => (Path::Mass, Some((bundle.mass_point, 0))),
+        1 => (Path::Plane, bundle.closed_form(options)),
+        2 => (Path::TwoPlanes, bundle.closed_form(options)),
+        3 => (Path::ThreePlanes, bundle.closed_form(options)),
+        _ => (Path::Ldl, full_rank(qef.insert(accumulate(hits)), bundle.mass_point, options)),
+    };
+    if let Some((free, rank)) = free {
+        let position = bundle.with_exact_coordinates(free);
+        if contains(options, position) {
+            return Attempt::Done(Solution { position, rank, path, clamped: false });
         }
-        _ => bundle.closed_form(options).map(|at| (at, bundle.normals)),
     }
+    let qef = qef.unwrap_or_else(|| accumulate(hits));
+    Attempt::Waiting(Waiting { qef, exact: bundle.exact, has_normals: bundle.normals > 0 })
+}
+
+/// Places the vertex of a cell whose hits all have one normal: the same as [`begin`], sooner.
+#[inline]
+#[must_use]
+pub fn solve_flat(points: &[DVec3], unit_normal: DVec3, options: &QefOptions) -> Option<Solution> {
+    let bundle = Bundle::flat(points, unit_normal)?;
+    let (free, rank) = bundle.closed_form(options)?;
+    let position = bundle.with_exact_coordinates(free);
+    contains(options, position).then_some(Solution {
+        position,
+        rank,
+        path: Path::Plane,
+        clamped: false,
+    })
+}
+
+/// The solution of a quadric of full rank; `None` where it is not surely that.
+#[inline]
+fn full_rank(qef: &Qef, mass_point: DVec3, options: &QefOptions) -> Option<(DVec3, u8)> {
+    is_full_rank(&qef.ata, options.cutoff())
+        .then(|| (mass_point + ldl::solve(&qef.ata, qef.residual(mass_point)), 3))
 }
 
 /// The reference path, and the only one that ends at the border of the box.
-#[cold]
-fn by_spectrum(hits: &[Hit], bundle: &Bundle, path: Path, options: &QefOptions) -> Solution {
-    let free = by_jacobi(&accumulate(hits), options);
-    let position = bundle.with_exact_coordinates(free.position);
-    let clamped = free.clamped || !contains(options, position);
-    let path = if path == Path::Mass { path } else { Path::Jacobi };
-    Solution { position: confine(options, position), path, clamped, ..free }
+#[must_use]
+pub fn solve_together<const N: usize>(cells: &[Waiting; N], options: &QefOptions) -> [Solution; N] {
+    let spectra = Spectrum::of_all(&cells.each_ref().map(|cell| cell.qef.ata));
+    std::array::from_fn(|lane| {
+        let Waiting { qef, exact, has_normals } = &cells[lane];
+        let free = by_spectrum(qef, &spectra[lane], options);
+        let position = with_exact_coordinates(*exact, free.position);
+        let clamped = free.clamped || !contains(options, position);
+        let path = if *has_normals { Path::Jacobi } else { Path::Mass };
+        Solution { position: confine(options, position), path, clamped, ..free }
+    })
 }
 
 /// Solves one quadric by its eigenvalues, and again inside the box if the answer is outside.
-fn by_jacobi(qef: &Qef, options: &QefOptions) -> Solution {
+fn by_spectrum(qef: &Qef, spectrum: &Spectrum, options: &QefOptions) -> Solution {
     let m = qef.mass_point();
     let r = qef.residual(m);
-    let spectrum = Spectrum::of(&qef.ata);
     let rank = spectrum.rank(options.cutoff());
     let free = m + spectrum.solve(rank, r);
     let path = if rank == 0 { Path::Mass } else { Path::Jacobi };
@@ -84,7 +119,7 @@ impl Qef {
     /// The minimum of the quadric in the box of `options`, which is about the quadric's origin.
     #[must_use]
     pub fn solve(&self, options: &QefOptions) -> Solution {
-        by_jacobi(self, options)
+        by_spectrum(self, &Spectrum::of(&self.ata), options)
     }
 }
 
@@ -125,7 +160,7 @@ pub(crate) fn force(hits: &[Hit], path: Path, options: &QefOptions) -> Option<DV
         Path::Ldl => Some(m + ldl::solve(&qef.ata, qef.residual(m))),
         Path::Mass => Some(m),
         Path::Plane | Path::TwoPlanes | Path::ThreePlanes => {
-            Bundle::gather(hits).closed_form(options)
+            Bundle::gather(hits).closed_form(options).map(|(at, _)| at)
         }
     }
 }

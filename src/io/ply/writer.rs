@@ -12,8 +12,12 @@ use crate::store::Scratch;
 
 /// Room for any two counts.
 const HEADER_BYTES: usize = 320;
+/// Three coordinates.
+const VERTEX_BYTES: usize = 24;
 /// Length of the list and three indices.
 const FACE_BYTES: usize = 13;
+/// Vertices or faces that are handed on at a time.
+const BLOCK: usize = 128;
 
 /// Writes vertices at once and lays faces aside.
 #[derive(Debug)]
@@ -54,12 +58,13 @@ impl MeshSink for PlyWriter {
 
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
         self.vertices += positions.len() as u64;
-        for position in positions {
-            let mut bytes = [0; 24];
-            for (axis, coordinate) in position.iter().enumerate() {
-                bytes[8 * axis..8 * axis + 8].copy_from_slice(&coordinate.to_le_bytes());
+        let mut bytes = [0; BLOCK * VERTEX_BYTES];
+        for block in positions.chunks(BLOCK) {
+            let numbers = block.as_flattened().iter();
+            for (number, bytes) in numbers.zip(bytes.as_chunks_mut::<8>().0) {
+                *bytes = number.to_le_bytes();
             }
-            self.output.write(&bytes)?;
+            self.output.write(&bytes[..block.len() * VERTEX_BYTES])?;
         }
         Ok(())
     }
@@ -70,12 +75,14 @@ impl MeshSink for PlyWriter {
         _corners: &[[[f64; 3]; 3]],
     ) -> Result<(), IoError> {
         self.triangles += indices.len() as u64;
-        for triangle in indices {
-            let mut bytes = [3; FACE_BYTES];
-            for (corner, index) in triangle.iter().enumerate() {
-                bytes[1 + 4 * corner..5 + 4 * corner].copy_from_slice(&index.to_le_bytes());
+        let mut bytes = [3; BLOCK * FACE_BYTES];
+        for block in indices.chunks(BLOCK) {
+            for (triangle, bytes) in block.iter().zip(bytes.as_chunks_mut::<FACE_BYTES>().0) {
+                for (index, bytes) in triangle.iter().zip(bytes[1..].as_chunks_mut::<4>().0) {
+                    *bytes = index.to_le_bytes();
+                }
             }
-            self.faces.write(&bytes)?;
+            self.faces.write(&bytes[..block.len() * FACE_BYTES])?;
         }
         Ok(())
     }
