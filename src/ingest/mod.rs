@@ -16,12 +16,16 @@ mod duplicates;
 mod error;
 mod examine;
 mod packed;
+mod rims;
 mod soup;
+mod sums;
 mod touch;
 
 pub use area::SoupMeasure;
 pub use bins::{BinEntry, Bins, fill_bins};
 pub use duplicates::{DropRecord, SettleStats, Settled, settle};
 pub use error::IngestError;
+pub use rims::Rims;
 pub use soup::{AttributeRecord, Soup, SoupStats, read_soup};
+pub use sums::{SoupSums, sum_up};
 pub use touch::for_each_touched_brick;
