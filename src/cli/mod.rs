@@ -1,5 +1,7 @@
 //! The command line: arguments to settings, events to the terminal, errors to exit codes.
 
+mod arguments;
+mod estimate;
 mod exit_code;
 mod memory;
 mod progress;
@@ -28,6 +30,8 @@ struct Arguments {
 enum Command {
     /// Repair one model.
     Repair(repair::RepairArguments),
+    /// Tell what a repair will take: leaves, memory, disk, seconds.
+    Estimate(estimate::EstimateArguments),
 }
 
 /// Parses the command line and runs the command.
@@ -37,6 +41,7 @@ pub fn run() -> std::process::ExitCode {
     let chatter = Chatter::new(arguments.quiet, arguments.verbose);
     match arguments.command {
         Command::Repair(arguments) => repair::run(&arguments, &chatter),
+        Command::Estimate(arguments) => estimate::run(&arguments, &chatter),
     }
 }
 

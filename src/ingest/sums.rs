@@ -124,3 +124,61 @@ impl Adder {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::ingest::touch::for_each_touched_brick;
+    use crate::mesh::shapes::{Random, cuboid};
+    use crate::octree::Domain;
+
+    fn sums(triangles: &[[[f64; 3]; 3]]) -> SoupSums {
+        let mut adder = Adder::new();
+        triangles.iter().for_each(|corners| adder.add(corners));
+        adder.sums
+    }
+
+    #[test]
+    fn a_box_adds_up_to_its_sides_twice() {
+        let sums = sums(&cuboid([0.0; 3], [1.0, 2.0, 3.0]));
+        assert_eq!(sums.finite_triangles(), 12);
+        assert_eq!((sums.area, sums.projected_area), (22.0, 22.0));
+        // Each of the three pairs of sides has four triangles as wide as two edges.
+        assert_eq!(sums.extent, 4.0 * (3.0 + 4.0 + 5.0));
+    }
+
+    #[test]
+    fn corners_at_infinity_and_areas_beyond_all_numbers_are_left_out() {
+        let far = [[0.0; 3], [1e200, 0.0, 0.0], [0.0, 1e200, 0.0]];
+        let sums = sums(&[[[f64::NAN; 3]; 3], [[f64::INFINITY; 3]; 3], far]);
+        assert_eq!(sums.finite_triangles(), 1);
+        assert_eq!((sums.area, sums.projected_area, sums.extent), (0.0, 0.0, 0.0));
+    }
+
+    #[test]
+    fn the_mean_number_of_bricks_touched_is_what_the_sums_say() {
+        let unit = SnapBox { lo: [0.0; 3], hi: [1.0; 3] };
+        let domain = Domain::around(&unit, 9, false).expect("room enough");
+        let brick = domain.brick_units() as f64;
+        let mut random = Random::new(5);
+        for size in [0.1, 1.0, 4.0] {
+            let triangle: [[f64; 3]; 3] =
+                std::array::from_fn(|_| std::array::from_fn(|_| random.share() * size * brick));
+            let sums = sums(&[triangle]);
+            let expected = 1.0 + sums.extent / brick + sums.projected_area / (brick * brick);
+            let places = 4000;
+            let mut touched = 0_u32;
+            for _ in 0..places {
+                let shift: [f64; 3] = std::array::from_fn(|_| (4.0 + random.share()) * brick);
+                let corners = triangle.map(|c| std::array::from_fn(|a| (c[a] + shift[a]) as i32));
+                let done: Result<(), ()> = for_each_touched_brick(&domain, corners, &mut |_| {
+                    touched += 1;
+                    Ok(())
+                });
+                assert_eq!(done, Ok(()));
+            }
+            let mean = f64::from(touched) / f64::from(places);
+            assert!((mean / expected - 1.0).abs() < 0.03, "{size}: {mean}, not {expected}");
+        }
+    }
+}

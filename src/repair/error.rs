@@ -1,9 +1,9 @@
 //! What can end a repair without a result.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use crate::contour::{ContourError, WriteError};
-use crate::ingest::IngestError;
+use crate::ingest::{IngestError, SoupStats};
 use crate::io::IoError;
 use crate::patch::PatchError;
 use crate::sign::SignError;
@@ -167,7 +167,21 @@ impl RepairError {
         matches!(self.blame(), Blame::Internal | Blame::Disk | Blame::Interrupted)
     }
 
-    pub(crate) fn from_ingest(error: IngestError<IoError>, path: &std::path::Path) -> Self {
+    /// What is wrong with an input of which no triangle with an area is left.
+    pub(crate) fn no_triangle(path: &Path, stats: &SoupStats) -> Self {
+        let reason = format!(
+            "{} read, {} with corners that are not finite, {} faces with wild indices, {} faces \
+             with fewer than three corners, {} without area",
+            stats.triangles,
+            stats.nonfinite_triangles,
+            stats.discarded.wild_index_faces,
+            stats.discarded.short_faces,
+            stats.triangles - stats.nonfinite_triangles
+        );
+        Self::NoTriangle { path: path.to_path_buf(), reason }
+    }
+
+    pub(crate) fn from_ingest(error: IngestError<IoError>, path: &Path) -> Self {
         match error {
             IngestError::Source(error) => Self::Input(error),
             IngestError::Store(error) => Self::Store(error),

@@ -12,15 +12,16 @@ use crate::ingest::{
     BinEntry, Bins, DropRecord, SettleStats, Settled, Soup, SoupMeasure, fill_bins, read_soup,
     settle,
 };
-use crate::io::{CoordinateType, Format, IoError, ReadOptions};
+use crate::io::{Format, IoError, ReadOptions};
 use crate::monitor::{Counter, Monitor, Recording, Stage};
 use crate::octree::{BrickKey, Domain, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
+use crate::repair::depth::choose_domain;
 use crate::repair::finish::{Results, conclude};
 use crate::repair::outcome::Outcome;
 use crate::repair::plan::MemoryPlan;
-use crate::repair::settings::{Depth, Limits, Settings};
+use crate::repair::settings::{Limits, Settings};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, SignStats, assign_signs};
@@ -168,12 +169,12 @@ impl Run<'_> {
             .map_err(|e| RepairError::from_ingest(e, self.input))?;
         drop(source);
         if soup.spool.is_empty() {
-            return Err(self.no_triangle(&soup));
+            return Err(RepairError::no_triangle(self.input, &soup.stats));
         }
-        let domain = self.choose_domain(&soup)?;
+        let domain = choose_domain(self.input, &soup.bounds, self.settings.depth, self.format)?;
         let (bins, measure) = fill_bins(&soup, &domain, resources)?;
         if measure.area == 0.0 {
-            return Err(self.no_triangle(&soup));
+            return Err(RepairError::no_triangle(self.input, &soup.stats));
         }
         let settled = settle(&bins, &domain, soup.stats.triangles, resources)?;
         self.recording.end(Stage::Ingest);
@@ -186,44 +187,6 @@ impl Run<'_> {
             sign: SignStats::default(),
         };
         Ok((soup, bins, findings, settled))
-    }
-
-    fn no_triangle(&self, soup: &Soup) -> RepairError {
-        let stats = &soup.stats;
-        let reason = format!(
-            "{} read, {} with corners that are not finite, {} faces with wild indices, {} faces \
-             with fewer than three corners, {} without area",
-            stats.triangles,
-            stats.nonfinite_triangles,
-            stats.discarded.wild_index_faces,
-            stats.discarded.short_faces,
-            soup.spool.len()
-        );
-        RepairError::NoTriangle { path: self.input.to_path_buf(), reason }
-    }
-
-    fn choose_domain(&self, soup: &Soup) -> Result<Domain, RepairError> {
-        let single = self.format.coordinates() == CoordinateType::F32;
-        let around = |depth| {
-            Domain::around(&soup.bounds, depth, single)
-                .map_err(|possible_depth| RepairError::OutputTooCoarse { depth, possible_depth })
-        };
-        match self.settings.depth {
-            Depth::Levels(depth) => around(depth),
-            Depth::Tolerance { length, max_depth } => {
-                let tolerance = length
-                    .in_model_units(&soup.bounds)
-                    .ok_or_else(|| RepairError::NoUnit { path: self.input.to_path_buf() })?;
-                let mut domain = around(*Depth::RANGE.start())?;
-                for depth in *Depth::RANGE.start() + 1..=max_depth {
-                    if domain.cell_size() <= 2.0 * tolerance {
-                        break;
-                    }
-                    domain = around(depth)?;
-                }
-                Ok(domain)
-            }
-        }
     }
 
     fn scan(

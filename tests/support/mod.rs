@@ -3,7 +3,9 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 pub mod breakage;
+pub mod disk_watch;
 pub mod run;
+pub mod schema;
 pub mod soups;
 pub mod surface;
 
