@@ -278,3 +278,62 @@ fn the_help_names_every_exit_code() {
         assert!(text.contains(&format!("\n  {code}")), "exit code {code}is not in the help");
     }
 }
+
+/// Runs `brickmend estimate INPUT EXTRA...` in a folder and returns exit code, stdout and stderr.
+fn estimate(input: &Path, within: &Path, extra: &[&str]) -> (i32, String, String) {
+    let mut command = brickmend();
+    command.current_dir(within).arg("estimate").arg(input).args(extra);
+    let run = command.output().expect("the program starts");
+    let text = |bytes| String::from_utf8(bytes).expect("text");
+    (run.status.code().expect("no signal"), text(run.stdout), text(run.stderr))
+}
+
+#[test]
+fn an_estimate_tells_in_lines_or_json_and_writes_nothing() {
+    let folder = folder();
+    let cube = model(CUBE);
+    let (code, out, err) = estimate(&cube, folder.path(), &["--depth", "6"]);
+    assert_eq!((code, err.as_str()), (0, ""));
+    for word in ["leaf cells", "memory: at most", "disk: at most", "time: about", "from: 12 tri"] {
+        assert!(out.contains(word), "{word}: {out}");
+    }
+    assert_eq!(estimate(&cube, folder.path(), &["-q"]), (0, String::new(), String::new()));
+    let output = folder.path().join("out.stl").to_string_lossy().into_owned();
+    let json = |extra: &[&str]| -> serde_json::Value {
+        let (code, out, err) = estimate(&cube, folder.path(), extra);
+        assert_eq!((code, err.as_str()), (0, ""), "{extra:?}");
+        serde_json::from_str(&out).expect("stdout is JSON")
+    };
+    let named = json(&["--json", "--depth", "6", "-o", &output]);
+    assert_eq!(named["schema"], 1);
+    assert_eq!(named, json(&["--json", "--depth", "6", "--format", "stl"]));
+    let ply = json(&["--json", "--depth", "6", "--fill-rule", "evenodd", "--crease", "5"]);
+    assert!(ply["output_bytes"].as_u64() < named["output_bytes"].as_u64());
+    assert!(names_in(folder.path()).is_empty(), "an estimate writes nothing");
+}
+
+#[test]
+fn estimates_end_with_the_codes_of_repairs() {
+    let folder = folder();
+    let cube = model(CUBE);
+    for extra in [
+        &["--max-memory", "1MiB"][..],
+        &["--depth", "3"],
+        &["--tolerance", "3mm"],
+        &["-o", "out.step"],
+        &["--format", "step"],
+        &["--format", "ply", "-o", "out.ply"],
+    ] {
+        let (code, out, err) = estimate(&cube, folder.path(), extra);
+        assert_eq!((code, out.as_str()), (2, ""), "{extra:?}: {err}");
+        assert!(!err.is_empty(), "{extra:?}");
+    }
+    let garbage = folder.path().join("garbage.bin");
+    std::fs::write(&garbage, b"\x00\x01 this is no model").expect("writable");
+    let (code, out, err) = estimate(&garbage, folder.path(), &[]);
+    assert_eq!((code, out.as_str()), (65, ""), "{err}");
+    assert!(err.contains("garbage.bin"), "{err}");
+    let broken = model("testdata/defects/nan_vertex/model.obj");
+    assert_eq!(estimate(&broken, folder.path(), &["--strict"]).0, 65);
+    assert_eq!(estimate(&broken, folder.path(), &[]).0, 0);
+}

@@ -282,6 +282,22 @@ fn a_lost_page_ends_with_one_line_and_5() {
 }
 
 #[test]
+fn a_disk_limit_below_the_estimate_is_refused_before_work_with_the_number_needed() {
+    let (bench, expected) = small();
+    let mut command = bench.command();
+    let ended = Ended::from(command.args(["--max-disk", "100kB"]).output().expect("it starts"));
+    assert_eq!(ended.code, Some(2), "{}", ended.stderr);
+    ended.assert_says_one_line();
+    bench.assert_tidy();
+    let needed = ended.stderr.split(' ').filter_map(|word| word.parse::<u64>().ok()).max();
+    let needed = needed.expect("the number needed").to_string();
+    let mut command = bench.command();
+    let ended = Ended::from(command.args(["--max-disk", &needed]).output().expect("it starts"));
+    assert_eq!(ended.code, Some(0), "{}", ended.stderr);
+    assert!(bench.take_output() == expected);
+}
+
+#[test]
 fn fresh_starts_anew() {
     let (_workshop, bench) = long();
     let (mut child, _stderr) = start_until(&bench, "checkpoint: bin");

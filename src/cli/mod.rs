@@ -1,6 +1,8 @@
 //! The command line: arguments to settings, events to the terminal, errors to exit codes.
 
 mod allocator;
+mod arguments;
+mod estimate;
 mod exit_code;
 mod last_words;
 mod memory;
@@ -31,6 +33,8 @@ struct Arguments {
 enum Command {
     /// Repair one model.
     Repair(repair::RepairArguments),
+    /// Tell what a repair will take: leaves, memory, disk, seconds.
+    Estimate(estimate::EstimateArguments),
 }
 
 /// Parses the command line and runs the command.
@@ -40,6 +44,7 @@ pub fn run() -> std::process::ExitCode {
     let chatter = Chatter::new(arguments.quiet, arguments.verbose);
     match arguments.command {
         Command::Repair(arguments) => repair::run(&arguments, &chatter),
+        Command::Estimate(arguments) => estimate::run(&arguments, &chatter),
     }
 }
 

@@ -30,6 +30,11 @@ impl Chatter {
         Self { quiet, verbose, bars: !quiet && std::io::stderr().is_terminal() }
     }
 
+    /// Whether only errors are told.
+    pub fn is_quiet(self) -> bool {
+        self.quiet
+    }
+
     /// Says `text` unless told to be quiet.
     pub fn say(self, text: &str) {
         if !self.quiet {

@@ -4,15 +4,14 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use brickmend::contour::Method;
 use brickmend::io::{ReadOptions, format_of_extension};
 use brickmend::monitor::Void;
-use brickmend::repair::{Depth, Length, Limits, Outcome, RepairError, Settings, Verdict, repair};
+use brickmend::repair::{Limits, Outcome, RepairError, Verdict, repair};
 use brickmend::report::{OpenSource, PreviewOptions, write_preview};
-use brickmend::sign::FillRule;
 use brickmend::store::Scratch;
-use clap::{Args, ValueEnum};
+use clap::Args;
 
+use crate::cli::arguments::{ResourceArguments, ResultArguments, parse_size};
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
 use crate::cli::memory::peak_resident_bytes;
 use crate::cli::progress::{Chatter, Progress};
@@ -27,41 +26,14 @@ pub struct RepairArguments {
     /// Where the repaired model goes; its extension is its format.
     #[arg(short, long, value_name = "FILE")]
     output: PathBuf,
-    /// Octree depth, 4 to 15: 2^DEPTH cells a side.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(4..=15), help_heading = "Result")]
-    depth: Option<u32>,
-    /// Largest deviation, in model units or % of the bounding box diagonal; chooses the depth.
-    /// [default: 0.2%]
-    #[arg(long, value_name = "LENGTH", conflicts_with = "depth", help_heading = "Result")]
-    tolerance: Option<Length>,
-    /// Deepest depth that --tolerance may choose.
-    #[arg(long, default_value_t = Depth::DEFAULT_MAX, help_heading = "Result",
-          value_parser = clap::value_parser!(u32).range(4..=15))]
-    max_depth: u32,
-    /// What is inside.
-    #[arg(long, value_enum, default_value_t = FillRuleName::Solid, help_heading = "Result")]
-    fill_rule: FillRuleName,
-    /// Angle in degrees below which a crease is noise.
-    #[arg(long, value_name = "DEGREES", default_value = "12", value_parser = parse_angle,
-          help_heading = "Result")]
-    crease: f64,
-    /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
-    #[arg(long, help_heading = "Result")]
-    strict: bool,
-    /// Peak resident memory, such as 256MiB or 1GB.
-    #[arg(long, value_name = "SIZE", default_value = "1GiB", value_parser = parse_size,
-          help_heading = "Resources")]
-    max_memory: u64,
-    /// Worker threads [default: one per processor].
-    #[arg(short = 'j', long, value_name = "N", help_heading = "Resources")]
-    threads: Option<usize>,
+    #[command(flatten)]
+    result: ResultArguments,
+    #[command(flatten)]
+    resources: ResourceArguments,
     /// Most that scratch files and the output may take of the disk, such as 20GB [default: no
     /// limit].
     #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Resources")]
     max_disk: Option<u64>,
-    /// Folder for scratch files [default: beside the output].
-    #[arg(long, value_name = "DIR", help_heading = "Resources")]
-    work_dir: Option<PathBuf>,
     /// Start anew, whatever an earlier run of the same work left.
     #[arg(long, help_heading = "Resources")]
     fresh: bool,
@@ -74,72 +46,6 @@ pub struct RepairArguments {
     /// Draw the edges of the triangles as well.
     #[arg(long, requires = "preview", help_heading = "Report")]
     preview_edges: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum FillRuleName {
-    /// All that the outside cannot reach: unites overlaps, fills cavities.
-    Solid,
-    /// Parity of the walls crossed: keeps cavities, hollows overlaps.
-    Evenodd,
-}
-
-fn parse_angle(text: &str) -> Result<f64, String> {
-    match text.trim_end_matches("deg").trim().parse::<f64>() {
-        Ok(degrees) if (0.0..=90.0).contains(&degrees) => Ok(degrees),
-        _ => Err("expected an angle from 0 to 90 degrees".to_owned()),
-    }
-}
-
-/// Sizes with decimal (kB, MB, GB) or binary (KiB, MiB, GiB) units.
-fn parse_size(text: &str) -> Result<u64, String> {
-    let refuse = || format!("expected a size such as 256MiB or 1GB, found {text:?}");
-    let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
-    let (number, unit) = text.split_at(split);
-    let number: f64 = number.parse().map_err(|_| refuse())?;
-    let factor = match unit.trim().to_ascii_lowercase().as_str() {
-        "" | "b" => 1.0,
-        "k" | "kb" => 1e3,
-        "m" | "mb" => 1e6,
-        "g" | "gb" => 1e9,
-        "t" | "tb" => 1e12,
-        "kib" => 1024.0,
-        "mib" => 1024.0_f64.powi(2),
-        "gib" => 1024.0_f64.powi(3),
-        "tib" => 1024.0_f64.powi(4),
-        _ => return Err(refuse()),
-    };
-    Ok((number * factor) as u64)
-}
-
-impl RepairArguments {
-    fn settings(&self) -> Settings {
-        let depth = match (self.depth, self.tolerance) {
-            (Some(depth), _) => Depth::Levels(depth),
-            (None, tolerance) => Depth::Tolerance {
-                length: tolerance.unwrap_or(Length::Percent(0.2)),
-                max_depth: self.max_depth,
-            },
-        };
-        let fill_rule = match self.fill_rule {
-            FillRuleName::Solid => FillRule::Solid,
-            FillRuleName::Evenodd => FillRule::Evenodd,
-        };
-        let (crease_deg, strict) = (self.crease, self.strict);
-        Settings { depth, fill_rule, crease_deg, method: Method::Mdc, strict }
-    }
-
-    fn limits(&self) -> Limits {
-        let processors = std::thread::available_parallelism().map_or(1, usize::from);
-        Limits {
-            max_memory_bytes: self.max_memory,
-            threads: self.threads.unwrap_or(processors),
-            max_disk_bytes: self.max_disk,
-            work_dir: self.work_dir.clone(),
-            fresh: self.fresh,
-            ..Limits::default()
-        }
-    }
 }
 
 /// Runs the command.
@@ -157,8 +63,12 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         }
     };
     let progress = Progress::new(*chatter, stop.clone());
-    let settings = arguments.settings();
-    let limits = arguments.limits();
+    let settings = arguments.result.settings();
+    let limits = Limits {
+        max_disk_bytes: arguments.max_disk,
+        fresh: arguments.fresh,
+        ..arguments.resources.limits()
+    };
     let (input, output) = (&arguments.input, &arguments.output);
     let result = repair(input, output, format, &settings, &limits, &progress);
     progress.clear();
@@ -223,7 +133,7 @@ fn summary(outcome: &Outcome) -> String {
 fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
     let scratch =
         Scratch::new(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
-    let share_bytes = arguments.max_memory / 6;
+    let share_bytes = arguments.resources.max_memory / 6;
     let options = ReadOptions { share_bytes };
     let open = |path: &Path| -> Result<Box<dyn brickmend::mesh::MeshSource<Error = _>>, _> {
         let source = brickmend::io::open(path, &scratch, &options)?;
@@ -242,17 +152,3 @@ fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 struct Refused(String);
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn sizes_are_decimal_or_binary_by_their_unit() {
-        assert_eq!(parse_size("256MiB"), Ok(256 << 20));
-        assert_eq!(parse_size("1GB"), Ok(1_000_000_000));
-        assert_eq!(parse_size("1.5 GiB"), Ok(3 << 29));
-        assert!(parse_size("many").is_err());
-        assert!(parse_size("1 parsec").is_err());
-    }
-}

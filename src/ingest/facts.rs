@@ -74,7 +74,7 @@ pub(crate) fn counts_once(kinds: u32) -> bool {
     if saw(RIM_ODD | RIM_ALONE_OPEN) {
         return true;
     }
-    !saw(RIM_EVEN) && !(saw(RIM_ALONE_CLOSED) && saw(DIFFERS))
+    !(saw(RIM_EVEN) || saw(RIM_ALONE_CLOSED) && saw(DIFFERS))
 }
 
 /// Records on their way into a sort that all workers fill; the order does not matter there.

@@ -52,6 +52,18 @@ pub struct SoupStats {
     pub input_bytes: u64,
 }
 
+impl SoupStats {
+    /// Refuses broken faces where `strict` input was asked for.
+    pub(crate) fn refuse_broken<E: std::error::Error>(
+        &self,
+        strict: bool,
+    ) -> Result<(), IngestError<E>> {
+        let faces = self.discarded.wild_index_faces + self.discarded.short_faces;
+        let found = self.nonfinite_triangles + faces;
+        if strict && found > 0 { Err(IngestError::Broken { found }) } else { Ok(()) }
+    }
+}
+
 /// The triangles of the input.
 pub struct Soup {
     /// Finite triangles in file order.
@@ -120,11 +132,7 @@ pub fn read_soup<S: MeshSource + ?Sized>(
         discarded: source.discarded(),
         input_bytes: source.bytes_read(),
     };
-    let found =
-        stats.nonfinite_triangles + stats.discarded.wild_index_faces + stats.discarded.short_faces;
-    if strict && found > 0 {
-        return Err(IngestError::Broken { found });
-    }
+    stats.refuse_broken(strict)?;
     let (parts, materials) = (source.part_count(), source.material_count());
     Ok(Soup {
         spool: writer.spool.finish()?,

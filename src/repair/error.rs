@@ -3,7 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use crate::contour::{ContourError, WriteError};
-use crate::ingest::IngestError;
+use crate::ingest::{IngestError, SoupStats};
 use crate::io::IoError;
 use crate::patch::PatchError;
 use crate::sign::SignError;
@@ -39,6 +39,17 @@ pub enum RepairError {
         /// The budget.
         found_bytes: u64,
         /// The least that would do, with one thread.
+        needed_bytes: u64,
+    },
+    /// The disk limit is too small for this model.
+    #[error(
+        "A disk limit of {limit_bytes} bytes is below the estimate of {needed_bytes} bytes for \
+         this model at this depth"
+    )]
+    DiskBelowEstimate {
+        /// The limit.
+        limit_bytes: u64,
+        /// What the work folder and the output may take.
         needed_bytes: u64,
     },
     /// The input is not what it was when the run began.
@@ -159,6 +170,7 @@ impl RepairError {
             Self::NoTriangle { .. } | Self::Broken { .. } => Blame::Input,
             Self::InputChanged { .. } => Blame::Temporary,
             Self::BudgetBelowFloor { .. }
+            | Self::DiskBelowEstimate { .. }
             | Self::OutputIsInput { .. }
             | Self::NoUnit { .. }
             | Self::OutputTooCoarse { .. } => Blame::Usage,
@@ -200,6 +212,20 @@ impl RepairError {
             StoreError::Damaged { path, .. } => Some(path),
             _ => None,
         }
+    }
+
+    /// What is wrong with an input of which no triangle with an area is left.
+    pub(crate) fn no_triangle(path: &Path, stats: &SoupStats) -> Self {
+        let reason = format!(
+            "{} read, {} with corners that are not finite, {} faces with wild indices, {} faces \
+             with fewer than three corners, {} without area",
+            stats.triangles,
+            stats.nonfinite_triangles,
+            stats.discarded.wild_index_faces,
+            stats.discarded.short_faces,
+            stats.triangles - stats.nonfinite_triangles
+        );
+        Self::NoTriangle { path: path.to_path_buf(), reason }
     }
 
     pub(crate) fn from_ingest(error: IngestError<IoError>, path: &Path) -> Self {

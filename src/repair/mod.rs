@@ -6,7 +6,9 @@
 //! Memory:     [`Limits::max_memory_bytes`], shared out by one accountant.
 //! Fails:      [`RepairError`], one message with place, and the work folder kept or removed.
 
+mod depth;
 mod error;
+mod estimate;
 mod finish;
 mod lock;
 mod outcome;
@@ -19,6 +21,7 @@ mod step;
 mod workspace;
 
 pub use error::{Blame, RepairError};
+pub use estimate::{Bounds, Counts, DiskSteps, ESTIMATE_VERSION, Estimate, estimate};
 pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,

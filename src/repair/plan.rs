@@ -14,7 +14,7 @@ const THREAD_BYTES: u64 = 8 << 20;
 /// The least that sorts, tables and windows work with.
 const LEAST_SHARE_BYTES: u64 = 8 << 20;
 /// A mapped window, see `store`.
-const WINDOW_BYTES: u64 = 256 << 10;
+pub const WINDOW_BYTES: u64 = 256 << 10;
 /// Brick files that are read at one time.
 const OPEN_BRICK_FILES: u64 = 2;
 /// More cached windows do not help.

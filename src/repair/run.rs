@@ -9,6 +9,7 @@ use rayon::ThreadPool;
 use crate::io::{Format, IoError, check_output};
 use crate::monitor::{Counter, Monitor, Recording};
 use crate::repair::RepairError;
+use crate::repair::estimate::estimate;
 use crate::repair::finish::conclude;
 use crate::repair::outcome::Outcome;
 use crate::repair::plan::MemoryPlan;
@@ -112,6 +113,17 @@ fn run_key(
     Ok(*hasher.finalize().as_bytes())
 }
 
+/// Passes on nothing but the wish to stop.
+struct OnlyCancel<'m> {
+    monitor: &'m dyn Monitor,
+}
+
+impl Monitor for OnlyCancel<'_> {
+    fn cancelled(&self) -> bool {
+        self.monitor.cancelled()
+    }
+}
+
 /// What tells that a file was replaced or changed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct InputIdentity {
@@ -153,6 +165,7 @@ impl Run<'_> {
     /// Does all steps that are left and puts the output in its place. A file of the work folder
     /// that turns out damaged is made again from the step before.
     fn to_the_end(&self, workspace: &Workspace, pool: &ThreadPool) -> Result<Outcome, RepairError> {
+        self.check_disk_limit(workspace)?;
         let _leases = self.plan.lease(&self.accountant)?;
         let mut rebuilt = Vec::new();
         loop {
@@ -175,6 +188,24 @@ impl Run<'_> {
             self.recording.note(&format!("{error}; going back to {}", step.name()));
             rebuilt.push(name);
         }
+    }
+
+    /// Refuses a disk limit below the estimate, as long as no work would be lost by that.
+    fn check_disk_limit(&self, workspace: &Workspace) -> Result<(), RepairError> {
+        let Some(limit_bytes) = self.limits.max_disk_bytes else { return Ok(()) };
+        if workspace.next_step() != Some(Step::Read) {
+            return Ok(());
+        }
+        let limits =
+            Limits { work_dir: Some(workspace.folder().to_path_buf()), ..self.limits.clone() };
+        // The estimate reads the input as well; what it reads is not what the run reads.
+        let quiet = OnlyCancel { monitor: &self.recording };
+        let needed_bytes =
+            estimate(self.input, self.format, self.settings, &limits, &quiet)?.disk_bytes;
+        if needed_bytes > limit_bytes {
+            return Err(RepairError::DiskBelowEstimate { limit_bytes, needed_bytes });
+        }
+        Ok(())
     }
 
     /// Does the steps that are left; what all of them found out.

@@ -8,14 +8,14 @@ use crate::ingest::{
     BinEntry, Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, fill_bins,
     read_soup, settle,
 };
-use crate::io::{CoordinateType, ReadOptions, check_output};
+use crate::io::{ReadOptions, check_output};
 use crate::mesh::SinkStats;
 use crate::monitor::{Counter, Monitor};
-use crate::octree::{BrickKey, Domain, DropRecord, Flips, SnapBox};
+use crate::octree::{BrickKey, Domain, DropRecord, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
+use crate::repair::depth::choose_domain;
 use crate::repair::run::Run;
-use crate::repair::settings::Depth;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
@@ -135,9 +135,10 @@ impl Run<'_> {
         self.check_unchanged()?;
         findings.soup = Some(soup.facts);
         if soup.spool.is_empty() {
-            return Err(self.no_triangle(findings));
+            return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
-        findings.domain = Some(self.choose_domain(&soup.facts.bounds)?);
+        let (depth, bounds) = (self.settings.depth, &soup.facts.bounds);
+        findings.domain = Some(choose_domain(self.input, bounds, depth, self.format)?);
         Ok(soup.files())
     }
 
@@ -153,47 +154,9 @@ impl Run<'_> {
         findings.bins = bins.entries.len();
         findings.left_out = bins.left_out;
         if measure.area == 0.0 {
-            return Err(self.no_triangle(findings));
+            return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
         Ok(bins.files())
-    }
-
-    fn no_triangle(&self, findings: &Findings) -> RepairError {
-        let stats = &findings.soup().stats;
-        let reason = format!(
-            "{} read, {} with corners that are not finite, {} faces with wild indices, {} faces \
-             with fewer than three corners, {} without area",
-            stats.triangles,
-            stats.nonfinite_triangles,
-            stats.discarded.wild_index_faces,
-            stats.discarded.short_faces,
-            stats.triangles - stats.nonfinite_triangles
-        );
-        RepairError::NoTriangle { path: self.input.to_path_buf(), reason }
-    }
-
-    fn choose_domain(&self, bounds: &SnapBox) -> Result<Domain, RepairError> {
-        let single = self.format.coordinates() == CoordinateType::F32;
-        let around = |depth| {
-            Domain::around(bounds, depth, single)
-                .map_err(|possible_depth| RepairError::OutputTooCoarse { depth, possible_depth })
-        };
-        match self.settings.depth {
-            Depth::Levels(depth) => around(depth),
-            Depth::Tolerance { length, max_depth } => {
-                let tolerance = length
-                    .in_model_units(bounds)
-                    .ok_or_else(|| RepairError::NoUnit { path: self.input.to_path_buf() })?;
-                let mut domain = around(*Depth::RANGE.start())?;
-                for depth in *Depth::RANGE.start() + 1..=max_depth {
-                    if domain.cell_size() <= 2.0 * tolerance {
-                        break;
-                    }
-                    domain = around(depth)?;
-                }
-                Ok(domain)
-            }
-        }
     }
 
     fn sign(

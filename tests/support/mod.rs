@@ -3,9 +3,11 @@
 #![allow(dead_code, reason = "each test file uses its own part")]
 
 pub mod breakage;
+pub mod disk_watch;
 pub mod image;
 pub mod program;
 pub mod run;
+pub mod schema;
 pub mod soups;
 pub mod surface;
 pub mod targets;

@@ -128,15 +128,13 @@ pub fn repair_soup(bytes: &[u8]) {
     const MOST_TRIANGLES: usize = 64;
     let folder = folder();
     let mut text = String::new();
-    let mut triangles = 0;
-    for corners in bytes.chunks_exact(9).take(MOST_TRIANGLES) {
+    for (number, corners) in bytes.chunks_exact(9).take(MOST_TRIANGLES).enumerate() {
         for corner in corners.chunks_exact(3) {
             let [x, y, z] = [0, 1, 2].map(|a| f64::from(corner[a] as i8) / 8.0);
             text += &format!("v {x} {y} {z}\n");
         }
-        let first = 3 * triangles;
+        let first = 3 * number;
         text += &format!("f {} {} {}\n", first + 1, first + 2, first + 3);
-        triangles += 1;
     }
     let (input, output) = (folder.path().join("a.obj"), folder.path().join("out.ply"));
     std::fs::write(&input, text).expect("writable");

@@ -1,0 +1,129 @@
+//! Arguments that commands share: what changes the result, and what a run may use.
+
+use std::path::PathBuf;
+
+use brickmend::contour::Method;
+use brickmend::repair::{Depth, Length, Limits, Settings};
+use brickmend::sign::FillRule;
+use clap::{Args, ValueEnum};
+
+/// What changes the result.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Result")]
+pub struct ResultArguments {
+    /// Octree depth, 4 to 15: 2^DEPTH cells a side.
+    #[arg(long, value_parser = clap::value_parser!(u32).range(4..=15))]
+    depth: Option<u32>,
+    /// Largest deviation, in model units or % of the bounding box diagonal; chooses the depth.
+    /// [default: 0.2%]
+    #[arg(long, value_name = "LENGTH", conflicts_with = "depth")]
+    tolerance: Option<Length>,
+    /// Deepest depth that --tolerance may choose.
+    #[arg(long, default_value_t = Depth::DEFAULT_MAX,
+          value_parser = clap::value_parser!(u32).range(4..=15))]
+    max_depth: u32,
+    /// What is inside.
+    #[arg(long, value_enum, default_value_t = FillRuleName::Solid)]
+    fill_rule: FillRuleName,
+    /// Angle in degrees below which a crease is noise.
+    #[arg(long, value_name = "DEGREES", default_value = "12", value_parser = parse_angle)]
+    crease: f64,
+    /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
+    #[arg(long)]
+    strict: bool,
+}
+
+/// What a run may use.
+#[derive(Debug, Args)]
+#[command(next_help_heading = "Resources")]
+pub struct ResourceArguments {
+    /// Peak resident memory, such as 256MiB or 1GB.
+    #[arg(long, value_name = "SIZE", default_value = "1GiB", value_parser = parse_size)]
+    pub max_memory: u64,
+    /// Worker threads [default: one per processor].
+    #[arg(short = 'j', long, value_name = "N")]
+    threads: Option<usize>,
+    /// Folder for scratch files [default: beside the output].
+    #[arg(long, value_name = "DIR")]
+    pub work_dir: Option<PathBuf>,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum FillRuleName {
+    /// All that the outside cannot reach: unites overlaps, fills cavities.
+    Solid,
+    /// Parity of the walls crossed: keeps cavities, hollows overlaps.
+    Evenodd,
+}
+
+impl ResultArguments {
+    pub fn settings(&self) -> Settings {
+        let depth = match (self.depth, self.tolerance) {
+            (Some(depth), _) => Depth::Levels(depth),
+            (None, tolerance) => Depth::Tolerance {
+                length: tolerance.unwrap_or(Length::Percent(0.2)),
+                max_depth: self.max_depth,
+            },
+        };
+        let fill_rule = match self.fill_rule {
+            FillRuleName::Solid => FillRule::Solid,
+            FillRuleName::Evenodd => FillRule::Evenodd,
+        };
+        let (crease_deg, strict) = (self.crease, self.strict);
+        Settings { depth, fill_rule, crease_deg, method: Method::Mdc, strict }
+    }
+}
+
+impl ResourceArguments {
+    pub fn limits(&self) -> Limits {
+        let processors = std::thread::available_parallelism().map_or(1, usize::from);
+        Limits {
+            max_memory_bytes: self.max_memory,
+            threads: self.threads.unwrap_or(processors),
+            work_dir: self.work_dir.clone(),
+            ..Limits::default()
+        }
+    }
+}
+
+fn parse_angle(text: &str) -> Result<f64, String> {
+    match text.trim_end_matches("deg").trim().parse::<f64>() {
+        Ok(degrees) if (0.0..=90.0).contains(&degrees) => Ok(degrees),
+        _ => Err("expected an angle from 0 to 90 degrees".to_owned()),
+    }
+}
+
+/// Sizes with decimal (kB, MB, GB) or binary (KiB, MiB, GiB) units.
+pub fn parse_size(text: &str) -> Result<u64, String> {
+    let refuse = || format!("expected a size such as 256MiB or 1GB, found {text:?}");
+    let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
+    let (number, unit) = text.split_at(split);
+    let number: f64 = number.parse().map_err(|_| refuse())?;
+    let factor = match unit.trim().to_ascii_lowercase().as_str() {
+        "" | "b" => 1.0,
+        "k" | "kb" => 1e3,
+        "m" | "mb" => 1e6,
+        "g" | "gb" => 1e9,
+        "t" | "tb" => 1e12,
+        "kib" => 1024.0,
+        "mib" => 1024.0_f64.powi(2),
+        "gib" => 1024.0_f64.powi(3),
+        "tib" => 1024.0_f64.powi(4),
+        _ => return Err(refuse()),
+    };
+    Ok((number * factor) as u64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sizes_are_decimal_or_binary_by_their_unit() {
+        assert_eq!(parse_size("256MiB"), Ok(256 << 20));
+        assert_eq!(parse_size("1GB"), Ok(1_000_000_000));
+        assert_eq!(parse_size("1.5 GiB"), Ok(3 << 29));
+        assert!(parse_size("many").is_err());
+        assert!(parse_size("1 parsec").is_err());
+    }
+}

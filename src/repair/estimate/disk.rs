@@ -1,0 +1,249 @@
+//! How many bytes lie in the work folder, step by step.
+//!
+//! The sizes of records are those of docs/format.md. What a step reads goes once the step after it
+//! has finished, so the peak is the largest sum of what one step reads and writes. All of it is an
+//! upper bound: the counts are.
+
+use serde::{Deserialize, Serialize};
+
+use crate::ingest::SoupSums;
+use crate::io::Format;
+use crate::repair::estimate::counts::Counts;
+use crate::repair::plan::MemoryPlan;
+
+/// Records of spools.
+const SOUP_BYTES: f64 = 88.0;
+const ATTRIBUTE_BYTES: f64 = 40.0;
+const BIN_ENTRY_BYTES: f64 = 24.0;
+/// A copy that is dropped, at most three of four triangles.
+const DROP_BYTES: f64 = 16.0 * 0.75;
+const FLIP_BYTES: f64 = 16.0;
+/// Records of sorts: a triangle with its brick; an odd face with its component.
+const BIN_SORT_BYTES: f64 = 96.0;
+const FACE_BYTES: f64 = 24.0;
+/// A sort of wide records holds so many bytes more for the order of each.
+const ORDER_BYTES: f64 = 24.0;
+/// Triangles of a bin that are examined by hashing; a larger one is sorted by edges.
+pub const SMALL_BIN: f64 = 32_768.0;
+/// The largest bin has at most so many times the triangles of the mean one.
+const CROWDED: f64 = 50.0;
+/// Edges of a triangle in that sort.
+const EDGE_SORT_BYTES: f64 = 96.0;
+/// Records of bricks: what an edge, a kept hit, a plane, a crossing and a vertex take.
+const HIT_EDGE_BYTES: f64 = 8.0;
+const KEPT_HIT_BYTES: f64 = 4.0;
+const PLANE_BYTES: f64 = 32.0;
+const CROSSING_BYTES: f64 = 8.0;
+const OFFSET_BYTES: f64 = 2.0;
+const VERTEX_BYTES: f64 = 12.0;
+const CELL_BYTES: f64 = 4.0;
+/// Of three hits of an edge all are kept, of more three.
+const MOST_KEPT: f64 = 3.0;
+/// An archive's own fields and its entry in the directory.
+const ARCHIVE_BYTES: f64 = 60.0;
+const DIRECTORY_BYTES: f64 = 40.0;
+/// A brick holds the edges on its max sides as well: 33 x 33 lines in place of 32 x 32.
+const BORDER_SHARE: f64 = 33.0 * 33.0 / (32.0 * 32.0);
+/// Brick files grow by windows of this size, which no small record crosses.
+const WINDOW_BYTES: f64 = (256_u32 << 10) as f64;
+/// Pairs of regions and corners behind sheets; many only where the soup is smaller than cells.
+const REGION_BYTES_PER_FACE: f64 = 24.0;
+/// A vertex in text, and what a line of a face has besides digits.
+const LINE_BYTES: f64 = 66.0;
+const FACE_LINE_BYTES: f64 = 5.0;
+/// Hash of a vertex, and its position in the table of the reader.
+const HASH_BYTES: f64 = 8.0;
+const POSITION_BYTES: f64 = 24.0;
+/// What a proof writes of each triangle when too many vertices are under way at one time: corners,
+/// numbers and fans; without numbers in the file also a sort of the positions.
+const TAPE_BYTES: f64 = 130.0;
+const UNNUMBERED_TAPE_BYTES: f64 = 200.0;
+/// A vertex under way takes so much of the proof's memory, growth included.
+pub const FAN_BYTES: f64 = 250.0;
+/// Lock, manifest, headers, and what file systems round up.
+const SMALL_FILES_BYTES: f64 = (128_u32 << 10) as f64;
+
+/// Upper bounds of the bytes in the work folder during each step, the output's included.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct DiskSteps {
+    /// The file is read into the soup.
+    pub read: u64,
+    /// Triangles are sorted into bins.
+    pub bin: u64,
+    /// Duplicates are settled.
+    pub settle: u64,
+    /// Bins become hits.
+    pub scan: u64,
+    /// Odd faces become flips.
+    pub patch: u64,
+    /// Regions are joined.
+    pub flood: u64,
+    /// Regions become signs.
+    pub relabel: u64,
+    /// Cells get their vertices.
+    pub place: u64,
+    /// The surface is written.
+    pub write: u64,
+    /// The written file is proved.
+    pub prove: u64,
+}
+
+impl DiskSteps {
+    /// The largest of them.
+    #[must_use]
+    pub fn peak(&self) -> u64 {
+        let Self { read, bin, settle, scan, patch, flood, relabel, place, write, prove } = *self;
+        let all = [read, bin, settle, scan, patch, flood, relabel, place, write, prove];
+        all.into_iter().max().unwrap_or(0)
+    }
+}
+
+/// What an estimate of the disk rests on.
+pub struct DiskModel<'e> {
+    pub sums: &'e SoupSums,
+    pub counts: &'e Counts,
+    pub plan: &'e MemoryPlan,
+    pub format: Format,
+    /// What the reader of the input spilled.
+    pub reader_bytes: u64,
+}
+
+/// Sizes of the files of a run.
+pub struct FileSizes {
+    pub hits: f64,
+    pub signs: f64,
+    pub cells: f64,
+    pub output: f64,
+    /// Faces that wait until all vertices are written.
+    pub aside: f64,
+}
+
+impl DiskModel<'_> {
+    /// Adds up the files of each step.
+    pub fn steps(&self, files: &FileSizes) -> DiskSteps {
+        let most = &self.counts.at_most;
+        let triangles = self.sums.finite_triangles() as f64;
+        let share = self.plan.share_bytes as f64;
+        let attributes = if self.sums.has_attributes {
+            ATTRIBUTE_BYTES * self.sums.stats.triangles as f64
+        } else {
+            0.0
+        };
+        let kept = attributes + SMALL_FILES_BYTES;
+        let soup = SOUP_BYTES * triangles;
+        let pairs = most.brick_triangles as f64;
+        let bins = SOUP_BYTES * pairs + BIN_ENTRY_BYTES * self.counts.bricks as f64;
+        let runs = spilled(BIN_SORT_BYTES * pairs, ORDER_BYTES / BIN_SORT_BYTES, share);
+        let drops = DROP_BYTES * pairs;
+        let odd = most.odd_faces as f64;
+        // Sorted by place, written once, sorted by component.
+        let faces = FACE_BYTES * odd + 2.0 * spilled(FACE_BYTES * odd, 0.0, share / 4.0);
+        let flips = FLIP_BYTES * BORDER_SHARE * most.flips as f64;
+        let regions = REGION_BYTES_PER_FACE * odd;
+        let FileSizes { hits, signs, cells, output, aside } = *files;
+        DiskSteps {
+            read: (kept + soup + self.reader_bytes as f64) as u64,
+            bin: (kept + soup + bins + runs) as u64,
+            settle: (kept + soup + bins + drops + self.edge_sorts(pairs)) as u64,
+            scan: (kept + bins + drops + hits) as u64,
+            patch: (kept + bins + drops + hits + faces + 2.0 * flips) as u64,
+            flood: (kept + hits + flips + regions) as u64,
+            relabel: (kept + hits + flips + regions + signs) as u64,
+            place: (kept + hits + flips + signs + cells) as u64,
+            write: (kept + signs + cells + output + aside) as u64,
+            prove: (kept + cells + output + self.proof()) as u64,
+        }
+    }
+
+    /// The sizes of brick files and output.
+    pub fn files(&self) -> FileSizes {
+        let most = &self.counts.at_most;
+        let (vertices, triangles) = (most.vertices as f64, most.triangles as f64);
+        let pairs = most.brick_triangles as f64;
+        let edges = BORDER_SHARE * (most.hits as f64).min(3.0 * self.boxed_cells());
+        let kept = BORDER_SHARE * (most.hits as f64).min(3.0 * MOST_KEPT * self.boxed_cells());
+        let crossings = BORDER_SHARE * most.crossings as f64;
+        let hits = HIT_EDGE_BYTES * edges + KEPT_HIT_BYTES * kept + PLANE_BYTES * pairs.min(kept);
+        let signs = CROSSING_BYTES * crossings + PLANE_BYTES * pairs.min(kept).min(crossings);
+        let cells = (VERTEX_BYTES + CELL_BYTES) * vertices + OFFSET_BYTES * most.crossings as f64;
+        let face = face_bytes(self.format, vertices);
+        let (output, aside) = match self.format {
+            Format::Ply => (24.0 * vertices + face * triangles, face * triangles),
+            Format::Off => (LINE_BYTES * vertices + face * triangles, face * triangles),
+            Format::Obj => (LINE_BYTES * vertices + face * triangles, 0.0),
+            Format::Stl => (face * triangles, 0.0),
+        };
+        FileSizes {
+            hits: self.brick_file(hits),
+            signs: self.brick_file(signs),
+            cells: self.brick_file(cells),
+            output: output + 512.0,
+            aside,
+        }
+    }
+}
+
+impl DiskModel<'_> {
+    /// Cells in the box of the model, as far as they can be hit.
+    fn boxed_cells(&self) -> f64 {
+        self.counts.boxed_cells as f64
+    }
+
+    /// A brick file with so many bytes of lists.
+    fn brick_file(&self, lists: f64) -> f64 {
+        let bricks = self.counts.bricks.max(1) as f64;
+        let records = lists + ARCHIVE_BYTES * bricks;
+        // What is left of a window when the next record does not fit: half of one, or, where
+        // records are larger than half a window, as much again as they take.
+        let waste = (records / bricks / WINDOW_BYTES).min(1.0);
+        records * (1.0 + waste) + WINDOW_BYTES + DIRECTORY_BYTES * bricks
+    }
+
+    /// Triangles in the largest bin, at most.
+    pub fn largest_bin(&self) -> f64 {
+        let pairs = self.counts.at_most.brick_triangles as f64;
+        pairs.min(CROWDED * pairs / self.counts.bricks.max(1) as f64)
+    }
+
+    /// Sorts of the edges of the largest bins, one for each worker.
+    fn edge_sorts(&self, pairs: f64) -> f64 {
+        let largest = self.largest_bin();
+        if largest <= SMALL_BIN {
+            return 0.0;
+        }
+        let threads = self.plan.threads as f64;
+        let share = self.plan.share_bytes as f64 / 6.0 / threads;
+        pairs.min(threads * largest) / largest * spilled(EDGE_SORT_BYTES * largest, 0.0, share)
+    }
+
+    /// What the proof and the reader of the written file spill.
+    fn proof(&self) -> f64 {
+        let most = &self.counts.at_most;
+        let vertices = most.vertices as f64;
+        let share = self.plan.share_bytes as f64;
+        let (positions, tape) = if self.format.has_indices() {
+            (spilled(POSITION_BYTES * vertices, 0.0, share / 8.0), TAPE_BYTES)
+        } else {
+            (0.0, UNNUMBERED_TAPE_BYTES)
+        };
+        let hashes = spilled(HASH_BYTES * vertices, 0.0, share / 8.0);
+        let scattered = FAN_BYTES * self.counts.open_vertices as f64 > share / 4.0;
+        let tape = if scattered { tape * most.triangles as f64 } else { 0.0 };
+        positions + hashes + tape
+    }
+}
+
+/// Bytes that leave memory when they exceed `share`, with so much more of it for each of them.
+fn spilled(bytes: f64, overhead: f64, share: f64) -> f64 {
+    if bytes * (1.0 + overhead) > share { bytes } else { 0.0 }
+}
+
+/// A triangle in the output, among so many vertices.
+fn face_bytes(format: Format, vertices: f64) -> f64 {
+    let digits = vertices.max(1.0).log10().floor() + 1.0;
+    match format {
+        Format::Ply => 13.0,
+        Format::Stl => 50.0,
+        Format::Obj | Format::Off => 3.0 * digits + FACE_LINE_BYTES,
+    }
+}

@@ -1,0 +1,103 @@
+//! How much memory a run will hold at its peak.
+//!
+//! The budget is a bound by itself; small models stay far below it. The figures were fitted to the
+//! peaks that the kernel reports (VmHWM), step by step; see docs/estimate.md.
+
+use crate::ingest::SoupSums;
+use crate::io::Format;
+use crate::repair::estimate::counts::Counts;
+use crate::repair::estimate::disk::{FAN_BYTES, FileSizes, SMALL_BIN};
+use crate::repair::plan::{MemoryPlan, WINDOW_BYTES};
+
+/// The program, and what a worker holds while bricks pass.
+const BASE_BYTES: f64 = 9.0e6;
+const THREAD_BYTES: f64 = 1.0e6;
+/// OBJ files up to 4 MiB are held whole, this many times.
+const WHOLE_FILE_BYTES: f64 = (4_u32 << 20) as f64;
+const WHOLE_FILE_FACTOR: f64 = 5.0;
+/// A vertex of a larger file: position, texture coordinates, colour.
+const INPUT_VERTEX_BYTES: f64 = 36.0;
+/// A triangle while it is sorted into bins, with its place in the order.
+const BIN_SORT_BYTES: f64 = 120.0;
+/// A triangle whose bin is examined: by hashing, or by sorts where the bin is large.
+const HASHED_BYTES: f64 = 200.0;
+const SORTED_BYTES: f64 = 320.0;
+/// A flipped edge in the cuts of its opening, and an odd face.
+const FLIP_BYTES: f64 = 100.0;
+const FACE_BYTES: f64 = 100.0;
+/// A vertex of the output: its hash, and its position in the table of the reader.
+const HASH_BYTES: f64 = 8.0;
+const POSITION_BYTES: f64 = 24.0;
+/// What an allocator keeps of the lists of early steps; larger ones go back at once.
+const RETAINED_BYTES: f64 = (32_u32 << 20) as f64;
+/// Room that lists keep for growing.
+const GROWTH: f64 = 1.4;
+
+/// What an estimate of memory rests on.
+pub struct MemoryModel<'e> {
+    pub sums: &'e SoupSums,
+    pub counts: &'e Counts,
+    pub plan: &'e MemoryPlan,
+    pub format: Format,
+    /// Triangles in the largest bin.
+    pub largest_bin: f64,
+    pub input_format: Format,
+    /// Vertices that the input lists.
+    pub input_vertices: u64,
+}
+
+impl MemoryModel<'_> {
+    /// The peak of all steps, which `budget_bytes` bounds.
+    pub fn peak(&self, files: &FileSizes, budget_bytes: u64) -> u64 {
+        let most = &self.counts.at_most;
+        let share = self.plan.share_bytes as f64;
+        let pairs = most.brick_triangles as f64;
+        let windows = self.plan.cached_windows as f64 * WINDOW_BYTES as f64;
+        let window = |file: f64| file.min(windows);
+        let threads = self.plan.threads as f64;
+        let read = self.reader();
+        let bin = (BIN_SORT_BYTES * pairs).min(share);
+        let examine = if self.largest_bin > SMALL_BIN {
+            (SORTED_BYTES * pairs.min(threads * self.largest_bin)).min(share / 2.0)
+        } else {
+            HASHED_BYTES * pairs.min(threads * self.largest_bin)
+        };
+        let openings = FLIP_BYTES * most.flips as f64 + FACE_BYTES * most.odd_faces as f64;
+        let patch = window(files.hits) + openings.min(share);
+        let flood = window(files.hits) + (FACE_BYTES * most.odd_faces as f64).min(share);
+        let contour = window(files.signs) + window(files.cells);
+        let early = read.max(bin).max(examine);
+        let late = patch.max(flood).max(contour).max(self.proof(files));
+        let bytes =
+            BASE_BYTES + THREAD_BYTES * threads + early.max(early.min(RETAINED_BYTES) + late);
+        (bytes as u64).min(budget_bytes)
+    }
+
+    fn reader(&self) -> f64 {
+        let share = self.plan.share_bytes as f64;
+        let input = self.sums.stats.input_bytes as f64;
+        if self.input_format == Format::Obj && input <= 2.0 * WHOLE_FILE_BYTES {
+            return WHOLE_FILE_FACTOR * input;
+        }
+        (GROWTH * INPUT_VERTEX_BYTES * self.input_vertices as f64).min(share)
+    }
+
+    fn proof(&self, files: &FileSizes) -> f64 {
+        let share = self.plan.share_bytes as f64;
+        let vertices = self.counts.at_most.vertices as f64;
+        let hashes = (HASH_BYTES * vertices).min(share / 8.0);
+        let positions = if self.format.has_indices() {
+            (POSITION_BYTES * vertices).min(share / 8.0)
+        } else {
+            0.0
+        };
+        // A short OBJ file is held whole, and the output may be shorter than its bound.
+        let whole = if self.format == Format::Obj {
+            WHOLE_FILE_FACTOR * files.output.min(WHOLE_FILE_BYTES)
+        } else {
+            0.0
+        };
+        let open = (FAN_BYTES * self.counts.open_vertices as f64).min(share / 4.0);
+        (GROWTH * (hashes + positions) + open).max(whole)
+    }
+}
