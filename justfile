@@ -17,6 +17,11 @@ sweep MODELS OUT *ARGS:
     cargo build --release
     scripts/sweep.py {{MODELS}} {{OUT}} {{ARGS}}
 
+# Estimates and repairs every model below a folder and compares the two.
+check-estimate MODELS *ARGS:
+    cargo build --release
+    scripts/check_estimate.py {{MODELS}} {{ARGS}}
+
 # Writes testdata/ anew.
 testdata:
     scripts/make_testdata.py

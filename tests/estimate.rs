@@ -2,16 +2,20 @@
 
 mod support;
 
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use assert_cmd::Command;
 use brickmend::io::{Format, format_of_extension};
+use brickmend::mesh::shapes::{Corners, sphere};
 use brickmend::monitor::{Stage, Void};
 use brickmend::octree::SnapBox;
 use brickmend::repair::{
     Blame, Depth, ESTIMATE_VERSION, Estimate, Length, Limits, Outcome, RepairError, Settings,
     estimate, floor_bytes, repair,
 };
+use tempfile::NamedTempFile;
+
 use support::disk_watch::DiskWatch;
 use support::run::{Encoding, Workshop, at_depth};
 use support::schema::check_document;
@@ -48,7 +52,7 @@ fn measured(input: &Path, name: &str, settings: &Settings, limits: &Limits) -> (
 }
 
 #[test]
-fn leaves_of_closed_models_are_told_to_a_tenth_and_of_others_to_a_third() {
+fn leaves_of_closed_models_are_told_to_a_tenth_and_of_others_to_a_half() {
     for model in MODELS {
         for depth in 5..=8 {
             let settings = at_depth(depth);
@@ -57,8 +61,8 @@ fn leaves_of_closed_models_are_told_to_a_tenth_and_of_others_to_a_third() {
                 measured(&testdata(model), "out.ply", &settings, &limits(BUDGETS[1]));
             let ratio = told.leaf_cells as f64 / outcome.scan.leaf_cells as f64;
             let closed = model.contains("cube");
-            // The cabinet has doubled panels, and panels that lie in each other.
-            let range = if closed { 0.9..1.1 } else { 0.75..1.34 };
+            // The cabinet has doubled panels, which count once, and thin ones, which cancel out.
+            let range = if closed { 0.9..1.1 } else { 0.75..1.5 };
             assert!(range.contains(&ratio), "{model} at {depth}: {ratio}");
             assert_eq!(closed, told.input.rims.edges == 0.0, "{model}");
         }
@@ -178,18 +182,32 @@ fn deeper_grids_have_four_times_the_leaves_and_take_more_of_everything() {
     }
 }
 
+/// A file whose reader keeps its vertices in a table: three for each triangle.
+fn off_file(soup: &[Corners]) -> NamedTempFile {
+    let mut text = format!("OFF\n{} {} 0\n", 3 * soup.len(), soup.len());
+    for [x, y, z] in soup.iter().flatten() {
+        writeln!(text, "{x} {y} {z}").expect("strings grow");
+    }
+    for first in (0..3 * soup.len()).step_by(3) {
+        writeln!(text, "3 {first} {} {}", first + 1, first + 2).expect("strings grow");
+    }
+    let file = NamedTempFile::new().expect("a temporary file can be made");
+    std::fs::write(file.path(), text).expect("writable");
+    file
+}
+
 #[test]
 fn counts_depend_on_the_file_alone_and_readers_that_spill_leave_nothing_behind() {
     let folder = tempfile::tempdir().expect("a temporary folder can be made");
-    let input = testdata("models/sphere_without_cap.ply");
+    let input = off_file(&sphere([0.0; 3], 1.0, 24));
     let small = Limits {
         share_bytes: Some(16 << 10),
         threads: 1,
         work_dir: Some(folder.path().to_path_buf()),
         ..Limits::default()
     };
-    let told = estimated(&input, &at_depth(6), &small);
-    let other = estimated(&input, &at_depth(6), &limits(BUDGETS[1]));
+    let told = estimated(input.path(), &at_depth(6), &small);
+    let other = estimated(input.path(), &at_depth(6), &limits(BUDGETS[1]));
     assert_eq!((told.input, told.counts), (other.input, other.counts));
     let left: Vec<PathBuf> = std::fs::read_dir(folder.path())
         .expect("readable")

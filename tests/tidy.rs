@@ -349,6 +349,7 @@ fn links_in_the_documents_lead_somewhere() {
         "CHANGELOG.md",
         "docs/format.md",
         "docs/outcome.md",
+        "docs/estimate.md",
         "docs/glossary.md",
         "testdata/README.md",
     ];
