@@ -15,7 +15,7 @@ use clap::{Args, ValueEnum};
 
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
 use crate::cli::memory::peak_resident_bytes;
-use crate::cli::progress::{Chatter, Progress};
+use crate::cli::progress::{Chatter, Progress, on_one_line};
 
 /// Arguments of `brickmend repair`.
 #[derive(Debug, Args)]
@@ -183,7 +183,7 @@ fn summary(outcome: &Outcome) -> String {
     let proof = &outcome.output.proof;
     let mut text = format!(
         "{}: {} triangles, {} components, depth {}, area {:.4} of the input's, volume {:.6}",
-        outcome.output.path.display(),
+        on_one_line(&outcome.output.path.display().to_string()),
         proof.triangles,
         proof.components,
         outcome.grid.depth,

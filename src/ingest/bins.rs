@@ -1,12 +1,17 @@
 //! Second pass: every triangle into the bins of the bricks that it touches.
+//!
+//! Of a large triangle that comes again and again in a row, the third and later copies lie only in
+//! the bins where copies are counted: two are enough to know that there are copies, and one counts
+//! at most. So a million sheets in one place are no more work than a million small triangles.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::ingest::area::{AreaHistogram, SoupMeasure};
+use crate::ingest::packed::{KeySet, Point, pack_corners};
 use crate::ingest::soup::Soup;
 use crate::ingest::touch::for_each_touched_brick;
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{BinTriangle, Domain, SoupTriangle};
+use crate::octree::{BinTriangle, BrickKey, Domain, SoupTriangle};
 use crate::store::{Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
 
 /// Spool of the binned triangles, by brick and source number.
@@ -15,6 +20,9 @@ pub const BINS: &str = "bins.spool";
 pub const BIN_ENTRIES: &str = "bins.entries";
 /// Triangles per work item.
 const ITEM_TRIANGLES: usize = 2048;
+
+/// Triangles whose box is longer than this, all sides together, are large.
+const LARGE_BRICKS: i64 = 4;
 
 /// Where the triangles of a brick lie.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
@@ -77,12 +85,22 @@ pub fn fill_bins(
         || (),
         |(), (triangles, held): (Vec<SoupTriangle>, _)| {
             let mut binned = Vec::with_capacity(triangles.len() * 5 / 4);
+            let mut copies = Copies::default();
             for triangle in &triangles {
-                let corners = triangle.corners.map(|c| domain.snap(c));
-                for_each_touched_brick(domain, corners, &mut |key| {
+                // In one order, so that copies touch the same bricks down to the last bit.
+                let mut corners = triangle.corners.map(|c| domain.snap(c));
+                corners.sort_unstable();
+                let mut add = |key: BrickKey| {
                     binned.push(BinTriangle { brick: key.0, triangle: *triangle });
-                    Ok::<(), StoreError>(())
-                })?;
+                };
+                if is_large(domain, corners) && copies.is_third(corners) {
+                    counting_bricks(domain, corners).for_each(add);
+                } else {
+                    for_each_touched_brick(domain, corners, &mut |key| {
+                        add(key);
+                        Ok::<(), StoreError>(())
+                    })?;
+                }
             }
             Ok((triangles, binned, held))
         },
@@ -92,6 +110,48 @@ pub fn fill_bins(
         },
     )?;
     Ok((write_bins(sorter, resources)?, histogram.finish()))
+}
+
+/// The large triangles of one work item, by their corners.
+#[derive(Default)]
+struct Copies {
+    once: KeySet<[u64; 4]>,
+    twice: KeySet<[u64; 4]>,
+}
+
+impl Copies {
+    /// Whether two triangles with these corners came before.
+    fn is_third(&mut self, corners: [[i32; 3]; 3]) -> bool {
+        let key = pack_corners(corners.map(unsigned));
+        !self.once.insert(key) && !self.twice.insert(key)
+    }
+}
+
+/// Lattice points of a model are never negative.
+fn unsigned(point: [i32; 3]) -> Point {
+    point.map(|c| c as u32)
+}
+
+/// Whether a triangle may touch more bricks than a few.
+fn is_large(domain: &Domain, corners: [[i32; 3]; 3]) -> bool {
+    let reach = |axis: usize| {
+        let coordinates = corners.map(|c| i64::from(c[axis]));
+        coordinates.iter().max().zip(coordinates.iter().min()).map_or(0, |(hi, lo)| hi - lo)
+    };
+    (0..3).map(reach).sum::<i64>() > LARGE_BRICKS * domain.brick_units()
+}
+
+/// The bricks in whose bins copies and triangles without area are counted: the first one that the
+/// triangle touches, and the one that holds its lowest corner.
+fn counting_bricks(domain: &Domain, corners: [[i32; 3]; 3]) -> impl Iterator<Item = BrickKey> {
+    let mut first = None;
+    let _: Result<(), ()> = for_each_touched_brick(domain, corners, &mut |key| {
+        first = Some(key);
+        Err(())
+    });
+    let brick = domain.brick_units() as u32;
+    let lowest = BrickKey::new(unsigned(corners[0]).map(|c| c / brick));
+    first.into_iter().chain((first != Some(lowest)).then_some(lowest))
 }
 
 fn write_bins(sorter: Sorter<BinTriangle>, resources: &Resources) -> Result<Bins, StoreError> {

@@ -190,9 +190,16 @@ impl Run<'_> {
 
     fn no_triangle(&self, soup: &Soup) -> RepairError {
         let stats = &soup.stats;
+        let side = soup.bounds.longest();
+        let beyond = !soup.spool.is_empty() && side > 0.0 && !(1e-75..1e75).contains(&side);
+        let why = if beyond {
+            format!(" (sides of {side:e} have areas beyond double precision)")
+        } else {
+            String::new()
+        };
         let reason = format!(
             "{} read, {} with corners that are not finite, {} faces with wild indices, {} faces \
-             with fewer than three corners, {} without area",
+             with fewer than three corners, {} without area{why}",
             stats.triangles,
             stats.nonfinite_triangles,
             stats.discarded.wild_index_faces,
