@@ -57,8 +57,22 @@ impl Chatter {
             text.push_str(&format!(": {cause}"));
             source = cause.source();
         }
-        write_line(&text);
+        write_line(&on_one_line(&text));
     }
+}
+
+/// `text` on one line, whatever names of files it holds: what would break the line or turn the
+/// terminal around is shown as an escape.
+pub fn on_one_line(text: &str) -> String {
+    let breaks = |c: char| {
+        c.is_control()
+            || matches!(c, '\u{200e}' | '\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2066}'..='\u{2069}')
+    };
+    let mut line = String::with_capacity(text.len());
+    for c in text.chars() {
+        if breaks(c) { line.extend(c.escape_default()) } else { line.push(c) }
+    }
+    line
 }
 
 /// A closed stderr is no reason to stop working.
@@ -168,5 +182,16 @@ impl Monitor for Progress {
 
     fn cancelled(&self) -> bool {
         self.stop.is_asked()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_cannot_break_a_line_or_turn_the_terminal_around() {
+        let line = on_one_line("a\nb\r\x1b[31m\u{202e}c\u{2028}d é\\ \"x\"");
+        assert_eq!(line, "a\\nb\\r\\u{1b}[31m\\u{202e}c\\u{2028}d é\\ \"x\"");
     }
 }

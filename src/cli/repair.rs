@@ -14,7 +14,7 @@ use clap::Args;
 use crate::cli::arguments::{ResourceArguments, ResultArguments, parse_size};
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
 use crate::cli::memory::peak_resident_bytes;
-use crate::cli::progress::{Chatter, Progress};
+use crate::cli::progress::{Chatter, Progress, on_one_line};
 use crate::cli::signals::Stop;
 
 /// Arguments of `brickmend repair`.
@@ -113,7 +113,7 @@ fn summary(outcome: &Outcome) -> String {
     let proof = &outcome.output.proof;
     let mut text = format!(
         "{}: {} triangles, {} components, depth {}, area {:.4} of the input's, volume {:.6}",
-        outcome.output.path.display(),
+        on_one_line(&outcome.output.path.display().to_string()),
         proof.triangles,
         proof.components,
         outcome.grid.depth,

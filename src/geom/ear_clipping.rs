@@ -6,15 +6,22 @@
 //! The polygon is seen along the axis on which its Newell normal is largest. Turns are judged by
 //! exact predicates, so the answer does not depend on rounding. A polygon that only turns left is
 //! fanned. When no ear is left (self-crossing, flat or non-finite polygons), or after
-//! [`MOST_TESTS`] point tests, what remains is fanned from its first corner.
+//! [`MOST_TESTS`] point tests, what remains is fanned from its first corner. So it is where the
+//! polygons of one cutter together took more tests than are granted to so many corners.
 //!
 //! Memory: 20 bytes a corner, kept between polygons. Time: O(n) for convex polygons, O(n^2) as a
-//! rule, bounded by [`MOST_TESTS`]. Source: Meisters, "Polygons have ears" (1975).
+//! rule, bounded by [`MOST_TESTS`] for one polygon, by [`FREE_TESTS`] and [`TESTS_PER_CORNER`] for
+//! all. Source: Meisters, "Polygons have ears" (1975).
 
 use robust::{Coord, orient2d};
 
 /// Point-in-ear tests that are spent on one polygon before the rest of it is fanned.
 pub const MOST_TESTS: u64 = 1 << 26;
+/// Tests that all polygons of a cutter have in common ...
+pub const FREE_TESTS: u64 = 1 << 27;
+/// ... and tests that each of their corners adds: enough for any number of concave polygons of a
+/// thousand corners.
+pub const TESTS_PER_CORNER: u64 = 512;
 
 /// How much an ear may touch; each level is tried only when the one before finds nothing.
 #[derive(Clone, Copy, PartialEq, Eq, PartialOrd, Ord)]
@@ -33,7 +40,12 @@ pub struct EarClipper {
     flat: Vec<[f64; 2]>,
     next: Vec<u32>,
     previous: Vec<u32>,
+    /// Tests spent on this polygon, and how many may be.
     tests: u64,
+    most_tests: u64,
+    /// Tests spent on and corners of the polygons before.
+    earlier_tests: u64,
+    earlier_corners: u64,
 }
 
 impl EarClipper {
@@ -45,6 +57,7 @@ impl EarClipper {
             triangles.extend((count == 3).then_some([0, 1, 2]));
             return;
         }
+        self.earlier_corners += count as u64;
         self.flatten(corners);
         if (0..count).all(|i| self.turn((i + count - 1) % count, i, (i + 1) % count) > 0.0) {
             triangles.extend((1..count as u32 - 1).map(|i| [0, i, i + 1]));
@@ -87,7 +100,9 @@ impl EarClipper {
         let mut leniency = Leniency::Clean;
         let mut refused = 0;
         self.tests = 0;
-        while left > 3 && self.tests < MOST_TESTS {
+        let granted = FREE_TESTS.saturating_add(TESTS_PER_CORNER * self.earlier_corners);
+        self.most_tests = MOST_TESTS.min(granted.saturating_sub(self.earlier_tests));
+        while left > 3 && self.tests < self.most_tests {
             if self.is_ear(at, leniency) {
                 let (before, after) = (self.previous[at as usize], self.next[at as usize]);
                 triangles.push([before, at, after]);
@@ -110,6 +125,7 @@ impl EarClipper {
                 };
             }
         }
+        self.earlier_tests += self.tests;
         let mut middle = self.next[at as usize];
         for _ in 2..left {
             let after = self.next[middle as usize];
@@ -287,6 +303,31 @@ mod tests {
         corners.push([0.0, -1.0, 0.0]);
         assert_eq!(cut(&corners).len(), 1000);
         assert_eq!(total(&corners), 999.0 + 999.0 * 4.0);
+    }
+
+    #[test]
+    fn all_polygons_together_have_a_limit_and_are_fanned_beyond_it() {
+        // The teeth hide the ears from one another: each is found after a long search.
+        let count = 3000_u32;
+        let tooth = |i| {
+            let x = f64::from(i);
+            [x, f64::from(i % 2) * 1000.0 - 0.001 * x * x / f64::from(count), 0.0]
+        };
+        let mut corners: Vec<[f64; 3]> = (1..count).map(tooth).collect();
+        corners.push([f64::from(count) / 2.0, -1e6, 0.0]);
+        let mut cutter = EarClipper::default();
+        let mut triangles = Vec::new();
+        cutter.cut(&corners, &mut triangles);
+        let granted = TESTS_PER_CORNER * u64::from(count);
+        assert!(cutter.tests > granted, "no hard polygon: {}", cutter.tests);
+        // As if many of them had come before.
+        let spent = FREE_TESTS + granted;
+        cutter = EarClipper { earlier_tests: spent, earlier_corners: count.into(), ..cutter };
+        cutter.cut(&corners, &mut triangles);
+        // The last test begun is ended.
+        assert!(cutter.tests <= granted + u64::from(count), "{}", cutter.tests);
+        assert_eq!(triangles.len() as u32, count - 2);
+        assert!(border_is_kept(count, &triangles));
     }
 
     #[test]

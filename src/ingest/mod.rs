@@ -4,7 +4,8 @@
 //! Out:        [`Soup`] (a spool of finite triangles, box, names, counts), then [`Bins`] (the same
 //!             triangles once per brick that they touch, by brick and source number), then
 //!             [`Settled`] (which copies of duplicates count, and how much of the soup is open).
-//! Invariant:  a triangle lies in the bin of every brick whose closed box it meets.
+//! Invariant:  a triangle lies in the bin of every brick whose closed box it meets; of copies, one
+//!             that counts does.
 //! Units:      model units in the spool, lattice units for all decisions.
 //! Memory:     the share of [`crate::store::Resources`]; nothing grows with the input.
 //! Fails:      [`IngestError`]; triangles with NaN or infinite corners are dropped and counted.

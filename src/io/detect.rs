@@ -8,6 +8,7 @@ use crate::io::input::Input;
 use crate::io::off::is_off_keyword;
 use crate::io::packed::{Packing, Unpacker, content_name};
 use crate::io::stl::{facets_by_size, may_be_facets};
+use crate::io::words::MARK;
 use crate::store::Scratch;
 
 /// How much of the content is looked at.
@@ -137,6 +138,7 @@ fn by_content(head: &[u8], size_bytes: Option<u64>) -> Option<Format> {
     if head.contains(&0) {
         return None;
     }
+    let head = head.strip_prefix(MARK).unwrap_or(head);
     let keyword = first_word_outside_of_comments(head)?;
     if keyword.eq_ignore_ascii_case(b"solid") {
         Some(Format::Stl)
@@ -181,6 +183,8 @@ mod tests {
             (b"# c\n\nCOFF # x\n", Format::Off),
             (b"OFF4 4 0\n", Format::Off),
             (b"# c\n\n  v 1 2 3\n", Format::Obj),
+            (b"\xef\xbb\xbfv 1 2 3\n", Format::Obj),
+            (b"\xef\xbb\xbfsolid a\n", Format::Stl),
         ] {
             for name in ["a.obj", "a.stl", "a.ply", "a.off", "a"] {
                 assert_eq!(detected(name, content).expect("known"), format, "{name}");

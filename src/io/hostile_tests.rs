@@ -102,6 +102,16 @@ fn absurd_counts_without_content_are_refused_at_once() {
 }
 
 #[test]
+fn headers_without_end_are_refused_before_they_fill_the_memory() {
+    let elements = "element x 1\n".repeat(5000);
+    let properties = format!("element x 1\n{}", "property int a\n".repeat(5000));
+    for lines in [elements, properties] {
+        let ply = format!("ply\nformat ascii 1.0\n{lines}end_header\n");
+        assert!(matches!(read_bytes("a.ply", ply.as_bytes()), Err(IoError::TooMany { .. })));
+    }
+}
+
+#[test]
 fn a_polygon_beyond_the_limit_is_refused_by_name() {
     let face = " 0".repeat(MOST_CORNERS + 1);
     let off = format!("OFF 1 1 0\n0 0 0\n{}{face}\n", MOST_CORNERS + 1);

@@ -7,6 +7,8 @@ use crate::io::error::{IoError, Place, shown};
 use crate::io::input::Input;
 use crate::io::numbers::parse_number;
 
+/// The byte order mark, which some editors put in front of UTF-8.
+pub(crate) const MARK: &[u8] = b"\xef\xbb\xbf";
 /// Longer words are nothing that any of our formats knows.
 const LONGEST_WORD_BYTES: usize = 4096;
 /// Longer names are refused.
@@ -36,6 +38,11 @@ impl Words {
         Self { input, dialect, line: 1 }
     }
 
+    /// Goes to the first byte of the text.
+    pub(crate) fn rewind(&mut self) {
+        self.seek(0, 1);
+    }
+
     pub(crate) fn input(&self) -> &Input {
         &self.input
     }
@@ -62,13 +69,37 @@ impl Words {
     /// The next word, on this line or a later one; `None` at the end of the file.
     #[inline]
     pub(crate) fn word(&mut self) -> Result<Option<&[u8]>, IoError> {
+        if self.input.offset() == 0 {
+            self.skip_mark()?;
+        }
+        self.skip_blank_lines();
         while !self.find_word()? {
             if !self.skip_line()? {
                 return Ok(None);
             }
+            self.skip_blank_lines();
         }
         let length = self.word_length()?;
         Ok(Some(self.input.take(length)))
+    }
+
+    #[cold]
+    fn skip_mark(&mut self) -> Result<(), IoError> {
+        if self.input.look_ahead(MARK.len())?.starts_with(MARK) {
+            self.input.consume(MARK.len());
+        }
+        Ok(())
+    }
+
+    /// Passes over what is blank and available, whole lines of it too.
+    #[inline]
+    fn skip_blank_lines(&mut self) {
+        let bytes = self.input.available();
+        let length = bytes.iter().position(|&b| !is_blank(b)).unwrap_or(bytes.len());
+        if length > 0 {
+            self.line += bytes[..length].iter().filter(|&&b| b == b'\n').count() as u64;
+            self.input.consume(length);
+        }
     }
 
     /// The next word on this line; the line's end is left where it is.
@@ -252,6 +283,16 @@ mod tests {
         assert_eq!(text(words.word_on_line().expect("reads")), None);
         assert_eq!(text(words.word().expect("reads")).as_deref(), Some("c#d"));
         assert_eq!(words.line(), 4);
+        assert_eq!(text(words.word().expect("reads")), None);
+    }
+
+    #[test]
+    fn blank_lines_are_counted_wherever_the_buffer_ends() {
+        let mut content = vec![b'\n'; 40_000];
+        content.extend_from_slice(b" \r\n\x0b\nx\n\n");
+        let (_folder, mut words) = words(&content, Dialect::Comments);
+        assert_eq!(text(words.word().expect("reads")).as_deref(), Some("x"));
+        assert_eq!(words.line(), 40_003);
         assert_eq!(text(words.word().expect("reads")), None);
     }
 

@@ -1,9 +1,9 @@
 //! What came of a repair: the JSON that the command line prints. See docs/outcome.md.
 
 use std::collections::BTreeMap;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 
 use crate::contour::ContourStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
@@ -32,6 +32,7 @@ pub enum Verdict {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SoupReport {
     /// Its path.
+    #[serde(serialize_with = "as_text")]
     pub path: PathBuf,
     /// Counts.
     #[serde(flatten)]
@@ -91,6 +92,7 @@ pub struct Dropped {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct OutputReport {
     /// Its path.
+    #[serde(serialize_with = "as_text")]
     pub path: PathBuf,
     /// Its size.
     pub bytes: u64,
@@ -187,4 +189,9 @@ pub struct Outcome {
     pub disk: DiskReport,
     /// Resumption.
     pub resume: ResumeReport,
+}
+
+/// Names of files may have any bytes, and JSON has text only.
+fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+    serializer.serialize_str(&path.to_string_lossy())
 }

@@ -37,8 +37,8 @@ impl Dictionary {
             scratch: scratch.clone(),
             share_bytes,
             hasher: RandomState::new(),
-            slots: Table::new(scratch, share_bytes / 4),
-            text: Table::new(scratch, share_bytes / 4),
+            slots: Table::scattered(scratch, share_bytes / 2),
+            text: Table::scattered(scratch, share_bytes / 4),
             ends: Table::new(scratch, share_bytes / 4),
         }
     }
@@ -140,10 +140,11 @@ impl Dictionary {
         Ok(true)
     }
 
-    /// Twice as many slots.
+    /// Twice as many slots. What was in order stays in order, so this goes through two stretches
+    /// of the new table side by side.
     fn grow(&mut self) -> Result<(), StoreError> {
         let count = (2 * self.slots.len()).max(FIRST_SLOTS);
-        let empty = Table::new(&self.scratch, self.share_bytes / 4);
+        let empty = Table::scattered(&self.scratch, self.share_bytes / 2);
         let mut old = std::mem::replace(&mut self.slots, empty);
         for _ in 0..count {
             self.slots.push([0; 2])?;

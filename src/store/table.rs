@@ -8,10 +8,11 @@ use crate::store::{Scratch, ScratchFile, StoreError};
 /// An array of records, read and written by index.
 ///
 /// Memory: `share_bytes` (at least two blocks of one page), and on disk 4 bytes for each block of
-/// 4 to 64 KiB. One user at a time.
+/// 4 to 64 KiB, or of 4 KiB where look-ups are scattered. One user at a time.
 pub struct Table<R: Pod> {
     scratch: Scratch,
     share_bytes: usize,
+    most_block_bytes: usize,
     len: u64,
     resident: Vec<R>,
     paged: Option<Paged<R>>,
@@ -37,6 +38,8 @@ struct Slot<R> {
     used: bool,
 }
 
+const LEAST_BLOCK_BYTES: usize = 4 << 10;
+const MOST_BLOCK_BYTES: usize = 64 << 10;
 const NO_BLOCK: u64 = u64::MAX;
 const NO_SLOT: u32 = u32::MAX;
 
@@ -45,7 +48,20 @@ impl<R: Pod> Table<R> {
     #[must_use]
     pub fn new(scratch: &Scratch, share_bytes: u64) -> Self {
         let share_bytes = usize::try_from(share_bytes).unwrap_or(usize::MAX).max(16 << 10);
-        Self { scratch: scratch.clone(), share_bytes, len: 0, resident: Vec::new(), paged: None }
+        Self {
+            scratch: scratch.clone(),
+            share_bytes,
+            most_block_bytes: MOST_BLOCK_BYTES,
+            len: 0,
+            resident: Vec::new(),
+            paged: None,
+        }
+    }
+
+    /// As [`Table::new`], for look-ups whose neighbours are of no use.
+    #[must_use]
+    pub fn scattered(scratch: &Scratch, share_bytes: u64) -> Self {
+        Self { most_block_bytes: LEAST_BLOCK_BYTES, ..Self::new(scratch, share_bytes) }
     }
 
     /// The number of records.
@@ -123,7 +139,7 @@ impl<R: Pod> Table<R> {
         let file = self.scratch.anonymous("table")?;
         file.write_at(bytemuck::cast_slice(&self.resident), 0)?;
         self.resident = Vec::new();
-        let block_bytes = (self.share_bytes / 8).clamp(4096, 64 << 10);
+        let block_bytes = (self.share_bytes / 8).clamp(LEAST_BLOCK_BYTES, self.most_block_bytes);
         let block_shift = (block_bytes / size_of::<R>()).max(1).ilog2();
         let block_records = 1 << block_shift;
         let slot_count = (self.share_bytes / (block_records * size_of::<R>())).max(2);

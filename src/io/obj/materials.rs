@@ -19,12 +19,18 @@ use crate::io::words::{Dialect, Words};
 use crate::mesh::Material;
 use crate::store::Scratch;
 
-/// The most libraries of one file.
-const MOST_LIBRARIES: usize = 4096;
+/// The most names of libraries in one file, and the most files that they lead to.
+const MOST_NAMES: u64 = 1 << 16;
+const MOST_FILES: usize = 4096;
 
 /// What the libraries of a file define, by name.
 pub(crate) struct Library {
-    folder: PathBuf,
+    /// The model, and where its folder really is, if it is there.
+    model: PathBuf,
+    folder: Option<PathBuf>,
+    /// Names so far, and the last statement: many files say it again for every object.
+    names: u64,
+    last: Vec<u8>,
     /// Device and inode of the files that were read.
     loaded: BTreeSet<(u64, u64)>,
     defined: Materials,
@@ -37,17 +43,27 @@ impl Library {
             Some(folder) if !folder.as_os_str().is_empty() => folder,
             _ => Path::new("."),
         };
-        let defined = Materials::new(scratch, share_bytes);
-        Self { folder: folder.to_path_buf(), loaded: BTreeSet::new(), defined }
+        Self {
+            model: model.to_path_buf(),
+            folder: folder.canonicalize().ok(),
+            names: 0,
+            last: Vec::new(),
+            loaded: BTreeSet::new(),
+            defined: Materials::new(scratch, share_bytes),
+        }
     }
 
     /// Reads what `mtllib` names: one file whose name may hold blanks, or several files.
     pub(crate) fn load(&mut self, names: &[u8]) -> Result<(), IoError> {
-        if let Some(path) = self.existing(names) {
+        if names == self.last {
+            return Ok(());
+        }
+        self.last = names.to_vec();
+        if let Some(path) = self.existing(names)? {
             return self.load_file(&path);
         }
         for name in names.split(u8::is_ascii_whitespace) {
-            if let Some(path) = self.existing(name) {
+            if let Some(path) = self.existing(name)? {
                 self.load_file(&path)?;
             }
         }
@@ -72,19 +88,22 @@ impl Library {
     }
 
     /// The path of a file inside of the model's folder, if it is there.
-    fn existing(&self, name: &[u8]) -> Option<PathBuf> {
+    fn existing(&mut self, name: &[u8]) -> Result<Option<PathBuf>, IoError> {
+        self.names += 1;
+        if self.names > MOST_NAMES {
+            return Err(IoError::too_many(&self.model, "names of material libraries", MOST_NAMES));
+        }
         let name: Vec<u8> = name.iter().map(|&b| if b == b'\\' { b'/' } else { b }).collect();
         let relative = Path::new(OsStr::from_bytes(&name));
         let stays_inside = relative
             .components()
             .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        if !stays_inside || name.is_empty() {
-            return None;
-        }
+        let Some(folder) = self.folder.as_ref().filter(|_| stays_inside && !name.is_empty()) else {
+            return Ok(None);
+        };
         // Links may lead elsewhere: where the file really is counts.
-        let path = self.folder.join(relative).canonicalize().ok()?;
-        let folder = self.folder.canonicalize().ok()?;
-        (path.starts_with(folder) && path.is_file()).then_some(path)
+        let Ok(path) = folder.join(relative).canonicalize() else { return Ok(None) };
+        Ok((path.starts_with(folder) && path.is_file()).then_some(path))
     }
 
     fn load_file(&mut self, path: &Path) -> Result<(), IoError> {
@@ -93,8 +112,9 @@ impl Library {
         if !self.loaded.insert((file.dev(), file.ino())) {
             return Ok(());
         }
-        if self.loaded.len() > MOST_LIBRARIES {
-            return Err(IoError::too_many(path, "material libraries", MOST_LIBRARIES as u64));
+        if self.loaded.len() > MOST_FILES {
+            let what = "material libraries";
+            return Err(IoError::too_many(&self.model, what, MOST_FILES as u64));
         }
         let Ok(input) = Input::open(path, 0) else { return Ok(()) };
         let mut words = Words::new(input, Dialect::Comments);

@@ -102,7 +102,7 @@ impl ObjStreamReader {
             colours: self.colours.is_some(),
         };
         self.polygon = PolygonCutter::new(columns);
-        self.words.seek(0, 1);
+        self.words.rewind();
         Ok(())
     }
 

@@ -255,6 +255,22 @@ fn a_library_is_read_once_by_whatever_names() {
 }
 
 #[test]
+fn names_of_libraries_without_end_are_refused() {
+    let line = format!("mtllib{}\n", " x".repeat(2000));
+    let other = format!("mtllib{}\n", " y".repeat(2000));
+    let model = Model::new(format!("{SQUARE}{}", format!("{line}{other}").repeat(17)).as_bytes());
+    assert!(matches!(model.by_stream(), Err(IoError::TooMany { .. })));
+    let model = Model::new(format!("{SQUARE}{}f 1 2 3\n", line.repeat(40)).as_bytes());
+    assert_eq!(model.twins().batch.len(), 1);
+}
+
+#[test]
+fn a_byte_order_mark_hides_no_vertex() {
+    let content = twins(format!("\u{feff}{SQUARE}f 1 2 3\n"));
+    assert_eq!(content.batch.corners, [[[0.0, 0.0, 0.0], [4.0, 0.0, 0.0], [4.0, 4.0, 0.0]]]);
+}
+
+#[test]
 fn libraries_are_found_by_names_of_any_bytes() {
     let model =
         Model::new(&[b"mtllib K\xfcche.mtl\nusemtl m\n", SQUARE.as_bytes(), b"f 1 2 3\n"].concat());

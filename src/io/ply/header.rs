@@ -1,11 +1,12 @@
 //! The header of a PLY file: which elements follow, and what each of them consists of.
 //!
-//! Memory: the properties, at most [`MOST_PROPERTIES`]; counts are believed only as they are read.
+//! Memory: the elements and properties, at most [`MOST_PROPERTIES`] of each; counts are believed
+//! only as they are read.
 
 use crate::io::error::{IoError, shown};
 use crate::io::words::Words;
 
-/// The most properties of all elements together.
+/// The most elements, and the most properties of all elements together.
 const MOST_PROPERTIES: usize = 4096;
 
 /// How the elements are written.
@@ -137,16 +138,16 @@ impl Header {
             match words.word_on_line()? {
                 None | Some(b"comment" | b"obj_info") => {}
                 Some(b"format") => encoding = Some(read_encoding(words)?),
-                Some(b"element") => elements.push(read_element(words)?),
+                Some(b"element") => {
+                    elements.push(read_element(words)?);
+                    check_count(words, "elements", elements.len())?;
+                }
                 Some(b"property") => {
                     let Some(element) = elements.last_mut() else {
                         return Err(words.unreadable("an element first", "a property"));
                     };
                     properties += 1;
-                    if properties > MOST_PROPERTIES {
-                        let path = words.input().path();
-                        return Err(IoError::too_many(path, "properties", MOST_PROPERTIES as u64));
-                    }
+                    check_count(words, "properties", properties)?;
                     element.properties.push(read_property(words, element.kind)?);
                 }
                 Some(b"end_header") => break,
@@ -203,6 +204,13 @@ impl Header {
         }
         Ok(())
     }
+}
+
+fn check_count(words: &Words, what: &'static str, count: usize) -> Result<(), IoError> {
+    if count <= MOST_PROPERTIES {
+        return Ok(());
+    }
+    Err(IoError::too_many(words.input().path(), what, MOST_PROPERTIES as u64))
 }
 
 fn read_encoding(words: &mut Words) -> Result<Encoding, IoError> {
