@@ -112,6 +112,7 @@ def main():
         left = sorted(path.name for path in folder.iterdir())
         if left != ["model.stl", "out.ply"]:
             sys.exit(f"left over after {killed} kills: {left}")
+        print(f"{killed} kills, {completed} outputs, {spent_s:.0f} s", flush=True)
     lost_s = (spent_s - completed * whole_s) / killed
     print(f"{killed} kills, {completed} outputs, all alike, nothing left over")
     print(f"lost per kill: {lost_s:.2f} s, {100 * lost_s / whole_s:.0f} % of a run")

@@ -6,12 +6,12 @@
 //! its rim:
 //!
 //! - other triangles in odd number somewhere: the soup is open there, one copy counts;
-//! - else in even number and not zero somewhere: an interface or a fold, none counts;
-//! - else no other triangles at all: a panel that was written twice, one copy counts; unless the
+//! - else no other triangles somewhere: a panel that was written twice, one copy counts; unless the
 //!   copies differ as given and their rim is closed as given: a fold that snapping pressed flat;
+//! - else in even number all along: an interface, none counts;
 //! - no rim: a closed surface that was written twice, one copy counts.
 //!
-//! So a soup that is closed mod 2 as given stays so, but for panels on their own whose sides are
+//! So a soup that is closed mod 2 as given stays so, but for panels that end in the open whose sides are
 //! exact copies: nothing tells such a panel from a flat bag.
 
 use std::sync::{Mutex, PoisonError};
@@ -74,7 +74,10 @@ pub(crate) fn counts_once(kinds: u32) -> bool {
     if saw(RIM_ODD | RIM_ALONE_OPEN) {
         return true;
     }
-    !(saw(RIM_EVEN) || saw(RIM_ALONE_CLOSED) && saw(DIFFERS))
+    if saw(RIM_ALONE_CLOSED) {
+        return !saw(DIFFERS);
+    }
+    !saw(RIM_EVEN)
 }
 
 /// Records on their way into a sort that all workers fill; the order does not matter there.
@@ -114,12 +117,14 @@ mod tests {
 
     #[test]
     fn a_patch_counts_once_unless_its_rim_says_otherwise() {
-        // A closed surface written twice; a panel written twice; one whose sides are a hair apart.
-        for kinds in [0, DIFFERS, RIM_ALONE_CLOSED, RIM_ALONE_OPEN | DIFFERS] {
+        // A closed surface written twice; a panel written twice, on its own or with one side at a
+        // closed surface; one whose sides are a hair apart.
+        let flap = RIM_EVEN | RIM_ALONE_CLOSED;
+        for kinds in [0, DIFFERS, RIM_ALONE_CLOSED, flap, RIM_ALONE_OPEN | DIFFERS] {
             assert!(counts_once(kinds), "{kinds}");
         }
-        // An interface, a flap on a closed surface, a fold that was pressed flat.
-        for kinds in [RIM_EVEN, RIM_EVEN | RIM_ALONE_CLOSED, RIM_ALONE_CLOSED | DIFFERS] {
+        // An interface, a fold that was pressed flat, also one on a closed surface.
+        for kinds in [RIM_EVEN, RIM_ALONE_CLOSED | DIFFERS, flap | DIFFERS] {
             assert!(!counts_once(kinds), "{kinds}");
         }
         // The soup is open there anyway.
