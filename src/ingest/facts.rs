@@ -11,8 +11,8 @@
 //! - else in even number all along: an interface, none counts;
 //! - no rim: a closed surface that was written twice, one copy counts.
 //!
-//! So a soup that is closed mod 2 as given stays so, but for panels that end in the open whose sides are
-//! exact copies: nothing tells such a panel from a flat bag.
+//! So a soup that is closed mod 2 as given stays so, but for panels that end in the open and whose
+//! sides are exact copies: nothing tells such a panel from a flat bag.
 
 use std::sync::{Mutex, PoisonError};
 
