@@ -29,3 +29,17 @@ testdata:
 # Licences and advisories of the dependencies.
 deny:
     cargo deny check
+
+# Kills a repair at random moments and checks what comes of it.
+soak *ARGS:
+    cargo build --release
+    scripts/soak_kills.py {{ARGS}}
+
+# Fuzzes a target of fuzz/ for some seconds; needs cargo-fuzz.
+fuzz TARGET SECONDS="60":
+    RUSTC_BOOTSTRAP=1 cargo fuzz run {{TARGET}} fuzz/corpus/{{TARGET}} testdata/fuzz/{{TARGET}} -- -max_total_time={{SECONDS}}
+
+# Compares estimates with what repairs take.
+estimates *ARGS:
+    cargo build --release
+    scripts/check_estimate.py {{ARGS}}
