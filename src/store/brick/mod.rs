@@ -6,7 +6,7 @@
 //!             multiple of 16 bytes, as rkyv archives need it.
 //! Memory:     the directory (40 bytes a record), and at most `cached_windows` windows besides
 //!             those that a [`View`] holds.
-//! Fails:      [`StoreError::Damaged`] when the bytes are not those that were written.
+//! Fails:      [`crate::store::StoreError::Damaged`] when the bytes are not those that were written.
 
 mod file;
 mod layout;
