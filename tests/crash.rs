@@ -198,6 +198,26 @@ fn files_that_are_not_ours_survive_in_a_folder_of_our_name() {
     assert!(bench.take_output() == expected);
 }
 
+#[test]
+fn an_input_in_the_work_folder_is_refused_and_stays() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let output = folder.path().join("out.ply");
+    let work = folder.path().join("out.ply.brickmend");
+    std::fs::create_dir(&work).expect("writable");
+    let bytes = std::fs::read(testdata("models/sphere_without_cap.ply")).expect("readable");
+    for name in ["output.part", "soup.spool", "lock", "manifest", "sort.3.tmp", "a.ply"] {
+        let input = work.join(name);
+        std::fs::write(&input, &bytes).expect("writable");
+        let mut command = std::process::Command::new(env!("CARGO_BIN_EXE_brickmend"));
+        command.arg("repair").arg(&input).arg("-o").arg(&output).args(["--depth", "4"]);
+        let ended = Ended::from(command.output().expect("the program starts"));
+        assert_eq!(ended.code, Some(2), "{name}: {}", ended.stderr);
+        ended.assert_says_one_line();
+        assert!(std::fs::read(&input).expect("still there") == bytes, "{name}");
+        std::fs::remove_file(&input).expect("removable");
+    }
+}
+
 /// A run long enough to be spoken to.
 fn long() -> (Workshop, Bench) {
     let workshop = Workshop::new();

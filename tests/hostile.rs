@@ -217,6 +217,9 @@ fn bombs_are_refused_before_they_burst() {
     assert_eq!(Case::holding("a.obj.gz", &lines).run("a gigabyte of lines"), 65);
     let nested = gzip([gzip([FACE.as_bytes().to_vec()])]);
     assert_eq!(Case::holding("a.obj.gz", &nested).run("packed twice"), 65);
+    let empty = gzip([]);
+    let members = empty.repeat((32 << 20) / empty.len());
+    assert_eq!(Case::holding("a.obj.gz", &members).run("a million empty members"), 65);
     let whole = gzip([FACE.as_bytes().to_vec()]);
     assert_eq!(Case::holding("a.obj.gz", &whole).run("a packed model"), 0);
     for length in [1, 9, 10, whole.len() / 2, whole.len() - 1] {

@@ -64,6 +64,14 @@ pub enum RepairError {
         /// The file.
         path: PathBuf,
     },
+    /// The input lies where scratch files lie, which are removed.
+    #[error("The input {path} lies in the work folder of this output, {folder}; move it first")]
+    InputInWorkFolder {
+        /// The input.
+        path: PathBuf,
+        /// The work folder.
+        folder: PathBuf,
+    },
     /// A length with a unit for a file without one.
     #[error("{path} states no unit, so a length in metres means nothing; give model units or %")]
     NoUnit {
@@ -172,6 +180,7 @@ impl RepairError {
             Self::BudgetBelowFloor { .. }
             | Self::DiskBelowEstimate { .. }
             | Self::OutputIsInput { .. }
+            | Self::InputInWorkFolder { .. }
             | Self::NoUnit { .. }
             | Self::OutputTooCoarse { .. } => Blame::Usage,
             Self::EmptyResult { .. } => Blame::Model,

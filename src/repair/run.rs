@@ -45,7 +45,7 @@ pub fn repair(
     let recording = Recording::new(monitor);
     let seen = InputIdentity::of(input)?;
     let key = run_key(input, format, settings, &recording)?;
-    let workspace = Workspace::open(output, limits, key)?;
+    let workspace = Workspace::open(input, output, limits, key)?;
     let accountant = Accountant::new(limits.max_memory_bytes);
     let run = Run { input, output, format, settings, limits, plan, recording, accountant, seen };
     match run.to_the_end(&workspace, &pool) {

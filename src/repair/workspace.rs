@@ -51,13 +51,19 @@ impl Workspace {
     ///
     /// # Errors
     /// [`RepairError::Locked`], or the folder cannot be made.
-    pub fn open(output: &Path, limits: &Limits, key: [u8; 32]) -> Result<Self, RepairError> {
+    pub fn open(
+        input: &Path,
+        output: &Path,
+        limits: &Limits,
+        key: [u8; 32],
+    ) -> Result<Self, RepairError> {
         let parent = parent_of(output);
         std::fs::metadata(parent).map_err(|e| StoreError::io("find the folder", parent, e))?;
         let mut name = output.file_name().map_or_else(|| OsString::from("out"), OsString::from);
         name.push(".");
         name.push(ENDING);
         let folder = limits.work_dir.as_deref().unwrap_or(parent).join(&name);
+        keep_input(input, &folder)?;
         let lock = lock_folder(&folder)?;
         let part = if same_device(&folder, parent)? {
             folder.join(OUTPUT_PART)
@@ -68,6 +74,9 @@ impl Workspace {
             hidden.push(".part");
             parent.join(hidden)
         };
+        if is_same_file(input, &part) {
+            return Err(RepairError::InputInWorkFolder { path: input.to_path_buf(), folder });
+        }
         let scratch = Scratch::limited(&folder, limits.max_disk_bytes.unwrap_or(u64::MAX));
         let workspace = Self {
             folder,
@@ -123,7 +132,7 @@ impl Workspace {
         let failed = |e| StoreError::io("list", &self.folder, e);
         for entry in std::fs::read_dir(&self.folder).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
-            if path.extension().is_some_and(|ending| ending == "tmp") {
+            if is_nameless(&path) {
                 self.scratch.remove_at(&path)?;
             }
         }
@@ -321,11 +330,36 @@ impl Checkpoints for StepCheckpoints<'_> {
     }
 }
 
+/// Whether the name is one that a scratch file has for a moment: purpose, number, `tmp`.
+fn is_nameless(path: &Path) -> bool {
+    let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+    let mut words = name.rsplit('.');
+    words.next() == Some("tmp") && words.next().is_some_and(|number| number.parse::<u64>().is_ok())
+}
+
 fn parent_of(path: &Path) -> &Path {
     match path.parent() {
         Some(parent) if !parent.as_os_str().is_empty() => parent,
         _ => Path::new("."),
     }
+}
+
+/// Refuses an input in the work folder, under any name: what lies there is swept.
+fn keep_input(input: &Path, folder: &Path) -> Result<(), RepairError> {
+    let Ok(entries) = std::fs::read_dir(folder) else { return Ok(()) };
+    for entry in entries {
+        let entry = entry.map_err(|e| StoreError::io("list", folder, e))?;
+        if is_same_file(input, &entry.path()) {
+            let (path, folder) = (input.to_path_buf(), folder.to_path_buf());
+            return Err(RepairError::InputInWorkFolder { path, folder });
+        }
+    }
+    Ok(())
+}
+
+fn is_same_file(a: &Path, b: &Path) -> bool {
+    let identity = |path: &Path| std::fs::metadata(path).map(|m| (m.dev(), m.ino()));
+    matches!((identity(a), identity(b)), (Ok(a), Ok(b)) if a == b)
 }
 
 fn same_device(a: &Path, b: &Path) -> Result<bool, StoreError> {

@@ -20,9 +20,10 @@ pub(crate) struct StagedFile {
 impl StagedFile {
     /// Creates the file beside `target`.
     pub(crate) fn create<E: std::error::Error>(target: &Path) -> Result<Self, PreviewError<E>> {
-        let mut name: OsString = target.file_name().unwrap_or_default().to_os_string();
+        let mut name = OsString::from(".");
+        name.push(target.file_name().unwrap_or_default());
         // One name for all runs: what a killed one left is written over by the next.
-        name.push(".partial");
+        name.push(".brickmend.partial");
         let partial = target.with_file_name(name);
         let mut options = File::options();
         options.read(true).write(true).create(true).truncate(false);

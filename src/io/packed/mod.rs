@@ -23,6 +23,9 @@ const HARMLESS_BYTES: u64 = 64 << 20;
 /// Beyond [`HARMLESS_BYTES`], content that takes more than this many times the bytes of the packed
 /// file read so far is refused. Models stay far below: text about 4, regular grids about 50.
 const MOST_RATIO: u64 = 256;
+/// More packed bytes than this without one byte of content are no model: empty members, or a name
+/// in a header that does not end.
+const MOST_IDLE_BYTES: u64 = 8 << 20;
 /// How much is unpacked at a time.
 const BLOCK_BYTES: usize = 256 << 10;
 
@@ -72,6 +75,8 @@ trait Stream: Read {
 #[derive(Debug)]
 struct PackedBytes {
     input: Input,
+    /// Bytes that were consumed since content came last.
+    idle_bytes: u64,
     failed: Option<IoError>,
 }
 
@@ -87,6 +92,12 @@ impl Read for PackedBytes {
 
 impl BufRead for PackedBytes {
     fn fill_buf(&mut self) -> std::io::Result<&[u8]> {
+        if self.idle_bytes > MOST_IDLE_BYTES {
+            let expected = format!("content within {MOST_IDLE_BYTES} packed bytes");
+            let place = Place::PackedByte(self.input.offset());
+            self.failed = Some(IoError::unreadable(self.input.path(), place, expected, "none"));
+            return Err(ErrorKind::Other.into());
+        }
         if self.input.available().is_empty()
             && let Err(error) = self.input.fill()
         {
@@ -98,6 +109,7 @@ impl BufRead for PackedBytes {
 
     fn consume(&mut self, count: usize) {
         self.input.consume(count);
+        self.idle_bytes += count as u64;
     }
 }
 
@@ -115,7 +127,7 @@ impl Unpacker {
     /// Unpacks the head of a file, of which nothing was consumed.
     pub(crate) fn new(input: Input, packing: Packing) -> Result<Self, IoError> {
         let path = input.path().to_path_buf();
-        let packed = PackedBytes { input, failed: None };
+        let packed = PackedBytes { input, idle_bytes: 0, failed: None };
         let stream = match packing {
             Packing::Gzip => gzip::decode(packed),
             Packing::Zstandard => zstandard::decode(packed)
@@ -164,7 +176,10 @@ impl Unpacker {
         while filled < BLOCK_BYTES && !self.ended {
             match self.stream.read(&mut self.block[filled..]) {
                 Ok(0) => self.ended = true,
-                Ok(count) => filled += count,
+                Ok(count) => {
+                    filled += count;
+                    self.stream.packed().idle_bytes = 0;
+                }
                 Err(error) => return Err(self.failed(&error)),
             }
         }
