@@ -19,6 +19,25 @@ static ALLOCATOR: OrEnd = OrEnd;
 /// Digits of the largest number of bytes.
 const MOST_DIGITS: usize = 20;
 
+/// Blocks of this size and more go back to the system at once when they are freed. Left alone, the
+/// system's allocator learns from the largest block freed and keeps the more the longer it runs.
+#[cfg(target_env = "gnu")]
+const LARGE_BYTES: i32 = 1 << 20;
+
+/// Makes the allocator return large blocks. Nothing where it has no such setting.
+pub fn return_large_blocks() {
+    #[cfg(target_env = "gnu")]
+    {
+        /// `M_MMAP_THRESHOLD` of malloc.h.
+        const MMAP_THRESHOLD: i32 = -3;
+        unsafe extern "C" {
+            fn mallopt(parameter: i32, value: i32) -> i32;
+        }
+        // SAFETY: a setting of the allocator, allowed at any time; the threshold is within bounds.
+        unsafe { mallopt(MMAP_THRESHOLD, LARGE_BYTES) };
+    }
+}
+
 fn or_end(block: *mut u8, bytes: usize) -> *mut u8 {
     if block.is_null() {
         refused(bytes);

@@ -39,6 +39,7 @@ enum Command {
 
 /// Parses the command line and runs the command.
 pub fn run() -> std::process::ExitCode {
+    allocator::return_large_blocks();
     // A usage error leaves here with exit code 2.
     let arguments = Arguments::parse();
     let chatter = Chatter::new(arguments.quiet, arguments.verbose);

@@ -12,7 +12,12 @@ use crate::contour::{ContourError, ContourOptions, ContourStats, Method};
 use crate::mesh::{MeshSink, SinkState};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, decode_cells};
-use crate::store::{BrickFile, Progress, Resources, StoreError, ordered};
+use crate::store::{BrickFile, Progress, Resources, StoreError, ordered_by_weight};
+
+/// What a byte of a record of cells takes as triangles.
+const FACTOR: u64 = 4;
+/// The same where triangles come with their corners.
+const FACTOR_WITH_CORNERS: u64 = 18;
 
 /// What can go wrong while the surface is written.
 #[derive(Debug, thiserror::Error)]
@@ -159,8 +164,10 @@ where
         let with_corners = self.sink.needs_corners();
         let mut numbers = self.items as usize - cells.len()..cells.len();
         let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-        let written = ordered(
+        let factor = if with_corners { FACTOR_WITH_CORNERS } else { FACTOR };
+        let written = ordered_by_weight(
             resources.pool,
+            resources.scales(|number: &usize| factor * cells.record_bytes(*number)),
             || {
                 if resources.monitor.cancelled() {
                     return Err(StoreError::Cancelled.into());

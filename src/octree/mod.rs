@@ -13,8 +13,8 @@ mod region;
 mod triangle;
 
 pub use brick::{
-    ArchivedCellBrick, ArchivedHitBrick, ArchivedSignBrick, BrickError, CellBrick, Crossing,
-    HitBrick, HitEdge, MAX_HITS, NO_PLANE, PATCH, SignBrick, SourcePlane, decode_cells,
+    ArchiveSize, ArchivedCellBrick, ArchivedHitBrick, ArchivedSignBrick, BrickError, CellBrick,
+    Crossing, HitBrick, HitEdge, MAX_HITS, NO_PLANE, PATCH, SignBrick, SourcePlane, decode_cells,
     decode_hits, decode_signs, encode,
 };
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};

@@ -20,7 +20,7 @@ use serde::{Deserialize, Serialize};
 use crate::octree::{BrickError, BrickKey, EdgeBits, FlipRecord, Flips, decode_hits};
 use crate::patch::faces::{ComponentFace, LocalComponents, find_components};
 use crate::patch::solve::Solver;
-use crate::store::{BrickFile, Resources, Sorter, StoreError, Unite, ordered};
+use crate::store::{BrickFile, Resources, Sorter, StoreError, Unite, ordered_by_weight};
 
 pub use faces::OddFace;
 
@@ -100,6 +100,9 @@ pub fn patch(
     Ok((flips, stats))
 }
 
+/// What a byte of a record takes while its odd faces are found and closed.
+const RECORD_FACTOR: u64 = 3;
+
 /// Faces of components that reach a brick border, with the labels that their bricks gave them.
 struct BorderFaces {
     faces: Sorter<ComponentFace>,
@@ -120,8 +123,9 @@ fn collect_faces(
     let workers = resources.pool.current_num_threads() as u64;
     let solver_share = resources.share_bytes / 4 / workers;
     let mut flagged = (0..hits.len()).filter(|&n| hits.directory()[n].flags & odd_flag != 0);
-    ordered(
+    ordered_by_weight(
         resources.pool,
+        resources.scales(|number: &usize| RECORD_FACTOR * hits.record_bytes(*number)),
         || {
             if resources.monitor.cancelled() {
                 return Err(PatchError::Store(StoreError::Cancelled));

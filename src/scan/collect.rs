@@ -8,7 +8,7 @@ use crate::octree::{
 };
 
 /// Hits that are held before they are reduced. Large enough for every brick of a sane model.
-pub const CHUNK_HITS: usize = 1 << 17;
+pub const CHUNK_HITS: usize = 1 << 16;
 
 /// One hit of a triangle on an edge.
 #[derive(Clone, Copy, Debug)]
@@ -21,21 +21,22 @@ pub struct Hit {
     pub up: bool,
 }
 
-/// A hit with its place on the edge.
+/// A plane with its place on the edge under way.
 #[derive(Clone, Copy, Debug)]
 struct Placed {
-    hit: Hit,
+    plane: u32,
     offset: f64,
 }
 
-/// All hits of one edge so far.
+/// All hits of one edge so far. 20 bytes: a brick of noise has a hundred thousand.
 #[derive(Clone, Copy, Debug)]
 struct EdgeHits {
     edge: u32,
-    class: u32,
+    /// Planes of the kept hits, from the lower end of the edge up.
+    planes: [u32; MAX_HITS],
     signed_sum: i16,
-    kept: usize,
-    hits: [Placed; MAX_HITS],
+    class: u8,
+    kept: u8,
 }
 
 /// Gathers the hits of one brick after another.
@@ -110,29 +111,39 @@ impl Collector {
                 brick.edges.push(HitEdge::new(edge, 1, 1, if hit.up { 1 } else { -1 }));
                 brick.hits.push(hit.plane);
             } else {
-                let group = self.place(start, count);
-                EdgeHits::merge(None, &group).push_to(&mut brick);
+                self.merge(None, start, count).push_to(&mut brick);
             }
             self.count_owned(edge, count);
             start += count;
         }
         self.chunk.clear();
-        brick.planes = prune_planes(&self.planes, &mut brick.hits);
+        self.hand_over_planes(&mut brick);
         brick
     }
 
     fn brick_of_edges(&mut self) -> HitBrick {
+        let edges = std::mem::take(&mut self.edges);
         let mut brick = HitBrick::default();
-        self.edges.iter().for_each(|edge| edge.push_to(&mut brick));
-        brick.planes = prune_planes(&self.planes, &mut brick.hits);
+        brick.edges.reserve_exact(edges.len());
+        brick.hits.reserve_exact(edges.iter().map(|edge| usize::from(edge.kept)).sum());
+        edges.iter().for_each(|edge| edge.push_to(&mut brick));
+        drop(edges);
+        self.hand_over_planes(&mut brick);
         brick
+    }
+
+    /// Moves the planes that the brick's hits use into the brick.
+    fn hand_over_planes(&mut self, brick: &mut HitBrick) {
+        prune_planes(&mut self.planes, |see| brick.hits.iter_mut().for_each(see));
+        brick.planes = std::mem::take(&mut self.planes);
     }
 
     /// Merges a full chunk into the edges and forgets planes that nobody keeps.
     fn reduce(&mut self) {
         self.sort_chunk();
         let old = std::mem::take(&mut self.edges);
-        let mut merged = Vec::with_capacity(old.len() + self.sorted.len());
+        let new = self.sorted.chunk_by(|a, b| a.edge == b.edge).count();
+        let mut merged = Vec::with_capacity(old.len() + new);
         let mut before = old.into_iter().peekable();
         let mut start = 0;
         while start < self.sorted.len() {
@@ -142,20 +153,18 @@ impl Collector {
                 merged.push(earlier);
             }
             let earlier = before.next_if(|earlier| earlier.edge == edge);
-            let group = self.place(start, count);
-            merged.push(EdgeHits::merge(earlier, &group));
+            merged.push(self.merge(earlier, start, count));
             self.count_owned(edge, count);
             start += count;
         }
         merged.extend(before);
-        let mut hits: Vec<u32> =
-            merged.iter().flat_map(|e| &e.hits[..e.kept]).map(|placed| placed.hit.plane).collect();
-        self.planes = prune_planes(&self.planes, &mut hits);
-        let mut renumbered = hits.into_iter();
-        for placed in merged.iter_mut().flat_map(|edge| &mut edge.hits[..edge.kept]) {
-            placed.hit.plane = renumbered.next().unwrap_or(NO_PLANE);
-        }
         self.edges = merged;
+        let edges = &mut self.edges;
+        prune_planes(&mut self.planes, |see| {
+            for edge in edges.iter_mut() {
+                edge.planes[..usize::from(edge.kept)].iter_mut().for_each(&mut *see);
+            }
+        });
         self.chunk.clear();
     }
 
@@ -192,55 +201,33 @@ impl Collector {
         }
     }
 
-    /// The hits of one edge with their places on it, from its lower end up.
-    fn place(&self, start: usize, count: usize) -> Vec<Placed> {
+    /// A plane with its place on an edge.
+    fn placed(&self, edge: u32, plane: u32) -> Placed {
+        let (axis, at) = edge_position(edge);
+        let offset = self.planes[plane as usize].offset_on_edge(axis, at, self.cell_units);
+        Placed { plane, offset }
+    }
+
+    /// Adds the sorted hits `start..start + count`, all on one edge, to what was there.
+    fn merge(&self, earlier: Option<EdgeHits>, start: usize, count: usize) -> EdgeHits {
         let hits = &self.sorted[start..start + count];
-        let mut placed: Vec<Placed> = hits
-            .iter()
-            .map(|&hit| {
-                let (axis, at) = edge_position(hit.edge);
-                let plane = &self.planes[hit.plane as usize];
-                Placed { hit, offset: plane.offset_on_edge(axis, at, self.cell_units) }
-            })
-            .collect();
-        placed.sort_by(|a, b| a.offset.total_cmp(&b.offset));
-        placed
-    }
-}
-
-/// The planes that `hits` use, in their old order; `hits` are renumbered.
-fn prune_planes(planes: &[SourcePlane], hits: &mut [u32]) -> Vec<SourcePlane> {
-    let mut number = vec![NO_PLANE; planes.len()];
-    hits.iter().for_each(|&plane| number[plane as usize] = 0);
-    let mut kept = Vec::with_capacity(planes.len());
-    for (plane, number) in planes.iter().zip(&mut number).filter(|(_, n)| **n != NO_PLANE) {
-        *number = kept.len() as u32;
-        kept.push(*plane);
-    }
-    hits.iter_mut().for_each(|plane| *plane = number[*plane as usize]);
-    kept
-}
-
-impl EdgeHits {
-    /// Adds a group of hits on one edge, by ascending place, to what was there.
-    fn merge(earlier: Option<Self>, group: &[Placed]) -> Self {
-        let mut all = earlier.unwrap_or(Self {
-            edge: group[0].hit.edge,
-            class: 0,
-            signed_sum: 0,
-            kept: 0,
-            hits: [group[0]; MAX_HITS],
-        });
-        for placed in group {
-            all.class = HitEdge::next_class(all.class);
-            all.signed_sum = all.signed_sum.saturating_add(if placed.hit.up { 1 } else { -1 });
+        let edge = hits[0].edge;
+        let none =
+            EdgeHits { edge, planes: [NO_PLANE; MAX_HITS], signed_sum: 0, class: 0, kept: 0 };
+        let mut all = earlier.unwrap_or(none);
+        for hit in hits {
+            all.class = HitEdge::next_class(all.class.into()) as u8;
+            all.signed_sum = all.signed_sum.saturating_add(if hit.up { 1 } else { -1 });
         }
+        let mut group: Vec<Placed> = hits.iter().map(|hit| self.placed(edge, hit.plane)).collect();
+        group.sort_by(|a, b| a.offset.total_cmp(&b.offset));
         let mut candidates = [group[0]; 2 * MAX_HITS];
-        let mut count = all.kept;
-        candidates[..count].copy_from_slice(&all.hits[..count]);
+        let mut count = usize::from(all.kept);
+        for (candidate, &plane) in candidates.iter_mut().zip(&all.planes[..count]) {
+            *candidate = self.placed(edge, plane);
+        }
         // First, middle and last of the group stand for it.
-        let last = group.len() - 1;
-        let picks = [0, group.len() / 2, last];
+        let picks = [0, group.len() / 2, group.len() - 1];
         let picks = match group.len() {
             1 => &picks[..1],
             2 => &picks[..2],
@@ -252,16 +239,40 @@ impl EdgeHits {
         }
         let candidates = &mut candidates[..count];
         candidates.sort_by(|a, b| a.offset.total_cmp(&b.offset));
-        all.kept = count.min(MAX_HITS);
+        all.kept = count.min(MAX_HITS) as u8;
         match count {
-            0..=MAX_HITS => all.hits[..count].copy_from_slice(candidates),
-            _ => all.hits = [candidates[0], candidates[count / 2], candidates[count - 1]],
+            0..=MAX_HITS => {
+                for (plane, candidate) in all.planes.iter_mut().zip(candidates) {
+                    *plane = candidate.plane;
+                }
+            }
+            _ => {
+                let three = [candidates[0], candidates[count / 2], candidates[count - 1]];
+                all.planes = three.map(|candidate| candidate.plane);
+            }
         }
         all
     }
+}
 
+/// Forgets the planes that nobody uses; `each_use` shows the numbers in use, which become new ones.
+fn prune_planes(planes: &mut Vec<SourcePlane>, mut each_use: impl FnMut(&mut dyn FnMut(&mut u32))) {
+    let mut number = vec![NO_PLANE; planes.len()];
+    each_use(&mut |plane| number[*plane as usize] = 0);
+    let mut kept = 0;
+    for (old, number) in number.iter_mut().enumerate().filter(|(_, n)| **n != NO_PLANE) {
+        *number = kept as u32;
+        planes[kept] = planes[old];
+        kept += 1;
+    }
+    planes.truncate(kept);
+    each_use(&mut |plane| *plane = number[*plane as usize]);
+}
+
+impl EdgeHits {
     fn push_to(&self, brick: &mut HitBrick) {
-        brick.edges.push(HitEdge::new(self.edge, self.class, self.kept, self.signed_sum));
-        brick.hits.extend(self.hits[..self.kept].iter().map(|placed| placed.hit.plane));
+        let (kept, class) = (usize::from(self.kept), u32::from(self.class));
+        brick.edges.push(HitEdge::new(self.edge, class, kept, self.signed_sum));
+        brick.hits.extend_from_slice(&self.planes[..kept]);
     }
 }

@@ -22,10 +22,14 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::monitor::{Counter, Gauge, Resident};
-use crate::octree::{BrickKey, Domain, DropRecord, EdgeBits, HitBrick, SIDE, SoupTriangle, encode};
+use crate::octree::{
+    AXIS_EDGES, BrickKey, Domain, DropRecord, EdgeBits, HitBrick, SIDE, SoupTriangle, encode,
+};
 use crate::scan::collect::Collector;
 use crate::scan::convert::Converter;
-use crate::store::{BrickFile, BrickPass, Resources, Spool, SpoolPeek, StoreError, ordered};
+use crate::store::{
+    BrickFile, BrickPass, Resources, Spool, SpoolPeek, StoreError, ordered_by_weight,
+};
 
 pub use collect::CHUNK_HITS;
 
@@ -33,6 +37,11 @@ pub use collect::CHUNK_HITS;
 pub const HITS: &str = "hits.bricks";
 /// Directory flag of bricks that see an odd face.
 pub const HAS_ODD_FACES: u32 = 1;
+
+/// What a triangle of a bin may take on its way into a record: its plane, its hits, the archive.
+const TRIANGLE_BYTES: u64 = 80;
+/// More triangles than this leave no more in a brick: three to an edge.
+const MOST_HEAVY_TRIANGLES: u64 = 3 * 3 * AXIS_EDGES as u64;
 
 /// Which triangles a brick is scanned from.
 #[derive(Clone, Debug)]
@@ -103,8 +112,10 @@ pub fn scan(
     }
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
     let bricks = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    let scanned = ordered(
+    let weigh = |item: &ScanItem| item.count.min(MOST_HEAVY_TRIANGLES) * TRIANGLE_BYTES;
+    let scanned = ordered_by_weight(
         resources.pool,
+        resources.scales(weigh),
         || if resources.monitor.cancelled() { Err(StoreError::Cancelled) } else { items() },
         || Workspace::new(domain),
         |space, item| {

@@ -10,10 +10,11 @@ use crate::octree::{
     BrickIndex, BrickKey, FaceRegions, Flips, Neighbour, Regions, edge_position, find_regions,
 };
 use crate::sign::SignError;
-use crate::sign::load::{LoadItems, Loaded};
+use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::sheets::Sheets;
 use crate::store::{
-    BrickFile, Labels, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite, ordered,
+    BrickFile, Labels, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite,
+    ordered_by_weight,
 };
 
 /// A brick of the graph. 16 bytes.
@@ -107,8 +108,9 @@ pub fn build_graph(
     let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, "even.spool")?;
     let mut regions = 0_u64;
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    ordered(
+    ordered_by_weight(
         resources.pool,
+        resources.scales(|item: &LoadItem| item.weight_bytes(hits)),
         || Ok(items.next()?),
         Loaded::default,
         |loaded, item| {

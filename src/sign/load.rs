@@ -20,6 +20,17 @@ pub struct LoadItem {
     pub sheet_corners: Vec<u32>,
 }
 
+/// What a byte of a record of hits takes while the brick is looked at, with what comes of it.
+const RECORD_FACTOR: u64 = 2;
+
+impl LoadItem {
+    /// About how much memory the brick takes.
+    pub fn weight_bytes(&self, hits: &BrickFile) -> u64 {
+        let record = self.hits.map_or(0, |number| hits.record_bytes(number));
+        RECORD_FACTOR * record + 2 * size_of_val(&*self.flips) as u64
+    }
+}
+
 /// Bricks with hits, flips or corners behind sheets, in Morton order.
 pub struct LoadItems<'f> {
     hits: &'f BrickFile,

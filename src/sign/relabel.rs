@@ -9,7 +9,7 @@ use crate::octree::{
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::{FillRule, SIGNS, SignError, SignStats};
-use crate::store::{BrickFile, BrickPass, Resources, ordered};
+use crate::store::{BrickFile, BrickPass, Resources, ordered_by_weight};
 
 struct RelabelItem {
     load: LoadItem,
@@ -43,8 +43,9 @@ pub fn relabel(
         bricks.next()?;
     }
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    let relabelled = ordered(
+    let relabelled = ordered_by_weight(
         resources.pool,
+        resources.scales(|item: &RelabelItem| item.load.weight_bytes(hits)),
         || {
             let Some(load) = items.next()? else { return Ok(None) };
             let brick = bricks.next()?.filter(|brick| brick.key == load.brick.0);

@@ -18,7 +18,7 @@ use crate::sign::graph::{Exterior, GraphBrick};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::store::{
     BrickFile, FileState, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError,
-    ordered,
+    ordered_by_weight,
 };
 
 /// Spool of the corners behind sheets.
@@ -64,8 +64,9 @@ pub fn find_sheets(
     let mut corners = Sorter::<SheetCorner>::new(resources.scratch, resources.share_bytes / 4);
     let mut items = LoadItems::new(hits, flips, None, resources);
     let mut number = 0;
-    ordered(
+    ordered_by_weight(
         resources.pool,
+        resources.scales(|item: &SheetItem| item.load.weight_bytes(hits)),
         || {
             while let Some(load) = items.next()? {
                 let brick = &bricks[number];

@@ -30,7 +30,7 @@ pub(crate) use digest::digest;
 pub use digest::{DIGEST_BYTES, Digest, Digester};
 pub use error::StoreError;
 pub use manifest::{Manifest, load_manifest, save_manifest};
-pub use pipeline::ordered;
+pub use pipeline::{Scales, ordered, ordered_by_weight};
 pub use resources::Resources;
 pub use scratch::{Scratch, sync_folder};
 pub use scratch_file::ScratchFile;

@@ -1,8 +1,9 @@
 //! Read, work, write: items in order through a pool of workers, with back-pressure.
 //!
-//! Memory: at most two items per worker are under way; feeding waits until the oldest is taken.
+//! Memory: at most two items per worker are under way, fewer where they weigh much; feeding waits
+//! until the oldest is taken.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, VecDeque};
 
 use crossbeam::channel::bounded;
 use rayon::ThreadPool;
@@ -19,6 +20,31 @@ const ITEMS_PER_WORKER: usize = 2;
 /// The first error of `feed`, `work` (in feeding order) or `take` ends the run.
 pub fn ordered<I: Send, O: Send, W, E: Send>(
     pool: &ThreadPool,
+    feed: impl FnMut() -> Result<Option<I>, E>,
+    workspace: impl Fn() -> W + Sync,
+    work: impl Fn(&mut W, I) -> Result<O, E> + Sync,
+    take: impl FnMut(O) -> Result<(), E>,
+) -> Result<(), E> {
+    let light = Scales { most_bytes: u64::MAX, weigh: |_: &I| 0 };
+    ordered_by_weight(pool, light, feed, workspace, work, take)
+}
+
+/// What items weigh, and how much may be under way at one time.
+#[derive(Clone, Copy)]
+pub struct Scales<F> {
+    /// The items under way weigh at most this together; a heavier one goes alone.
+    pub most_bytes: u64,
+    /// About how much memory an item takes, with its result.
+    pub weigh: F,
+}
+
+/// As [`ordered`], with no more under way than `scales` allow.
+///
+/// # Errors
+/// As [`ordered`].
+pub fn ordered_by_weight<I: Send, O: Send, W, E: Send>(
+    pool: &ThreadPool,
+    scales: Scales<impl Fn(&I) -> u64>,
     mut feed: impl FnMut() -> Result<Option<I>, E>,
     workspace: impl Fn() -> W + Sync,
     work: impl Fn(&mut W, I) -> Result<O, E> + Sync,
@@ -50,16 +76,23 @@ pub fn ordered<I: Send, O: Send, W, E: Send>(
         }
         drop((items, result_sender));
         let mut waiting = BTreeMap::new();
-        let (mut fed, mut taken, mut open) = (0, 0, true);
+        // Of the items under way, oldest first; a permit that workers take could deadlock, since
+        // results are taken in order.
+        let mut weights = VecDeque::new();
+        let (mut fed, mut taken, mut weight) = (0, 0, 0_u64);
+        let mut next = feed()?;
         loop {
-            while open && fed - taken < limit as u64 {
-                match feed()? {
-                    Some(item) => {
-                        item_sender.send((fed, item)).expect("workers listen until the end");
-                        fed += 1;
-                    }
-                    None => open = false,
-                }
+            while let Some(item) = next.take_if(|item| {
+                let more = (scales.weigh)(item);
+                weights.is_empty()
+                    || weights.len() < limit && weight.saturating_add(more) <= scales.most_bytes
+            }) {
+                let more = (scales.weigh)(&item);
+                weights.push_back(more);
+                weight += more;
+                item_sender.send((fed, item)).expect("workers listen until the end");
+                fed += 1;
+                next = feed()?;
             }
             if taken == fed {
                 return Ok(());
@@ -69,6 +102,7 @@ pub fn ordered<I: Send, O: Send, W, E: Send>(
             while let Some(result) = waiting.remove(&taken) {
                 take(result?)?;
                 taken += 1;
+                weight -= weights.pop_front().unwrap_or(0);
             }
         }
     })
@@ -77,6 +111,7 @@ pub fn ordered<I: Send, O: Send, W, E: Send>(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use std::sync::atomic::{AtomicU64, Ordering};
 
     fn pool(threads: usize) -> ThreadPool {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool")
@@ -127,5 +162,37 @@ mod tests {
         );
         assert_eq!(result, Err(50));
         assert_eq!(taken, 49);
+    }
+
+    #[test]
+    fn heavy_items_go_alone_and_light_ones_together() {
+        for threads in [1, 2, 8] {
+            let under_way = AtomicU64::new(0);
+            let mut next = 0_u64;
+            let mut taken = 0;
+            let scales = Scales { most_bytes: 10, weigh: |item: &u64| item % 13 };
+            let result: Result<(), ()> = ordered_by_weight(
+                &pool(threads),
+                scales,
+                || {
+                    next += 1;
+                    Ok((next <= 2000).then_some(next))
+                },
+                || (),
+                |(), item| {
+                    let weight = item % 13;
+                    let together = under_way.fetch_add(weight, Ordering::SeqCst) + weight;
+                    assert!(together <= 10.max(weight), "{together} with one of {weight}");
+                    under_way.fetch_sub(weight, Ordering::SeqCst);
+                    Ok(item)
+                },
+                |item| {
+                    taken += 1;
+                    assert_eq!(item, taken);
+                    Ok(())
+                },
+            );
+            assert_eq!((result, taken), (Ok(()), 2000));
+        }
     }
 }

@@ -3,7 +3,7 @@
 use rayon::ThreadPool;
 
 use crate::monitor::Monitor;
-use crate::store::{Backing, Checkpoints, Scratch};
+use crate::store::{Backing, Checkpoints, Scales, Scratch};
 
 /// What `repair` lends to a stage.
 #[derive(Clone, Copy)]
@@ -22,4 +22,11 @@ pub struct Resources<'r> {
     pub checkpoints: &'r dyn Checkpoints,
     /// Who hears of progress, and may stop the work.
     pub monitor: &'r dyn Monitor,
+}
+
+impl Resources<'_> {
+    /// Scales for work on bricks: those under way take at most a quarter of the share together.
+    pub fn scales<I, F: Fn(&I) -> u64>(&self, weigh: F) -> Scales<F> {
+        Scales { most_bytes: self.share_bytes / 4, weigh }
+    }
 }

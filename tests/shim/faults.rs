@@ -5,7 +5,7 @@
 //!
 //! - `SHIM_FAIL_CALL=n`: the n-th call for a file or a map fails, with `SHIM_ERRNO` (5).
 //! - `SHIM_KILL_CALL=n`: the process is killed (SIGKILL) at the n-th call.
-//! - `SHIM_FAIL_ALLOCATION=n`: the n-th request for 64 KiB of memory or more is refused.
+//! - `SHIM_FAIL_ALLOCATION=n`: the n-th request for 40 KiB of memory or more is refused.
 //! - `SHIM_ONLY=writes`: only calls that change the disk are counted.
 //!
 //! When it strikes it says `shim: struck` on stderr. Calls on stdout and stderr do not count.
@@ -32,7 +32,7 @@ const NEXT: *mut c_void = -1_isize as *mut c_void;
 const UNSET: u64 = u64::MAX;
 const UNREAD: u64 = u64::MAX - 1;
 const NO_MEMORY: c_int = 12;
-const LARGE_BYTES: usize = 64 << 10;
+const LARGE_BYTES: usize = 40 << 10;
 const WRITE: i64 = 1;
 
 static CALLS: AtomicU64 = AtomicU64::new(0);

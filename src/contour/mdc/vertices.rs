@@ -19,10 +19,13 @@ use crate::octree::{
     ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS, SIDE,
     SourcePlane, decode_signs, edge_position, encode,
 };
-use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered};
+use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
 /// A vertex keeps this many lattice units from the walls of its cell.
 const INSET_UNITS: i64 = 2;
+
+/// What a byte of a record of signs takes while vertices are placed, with the record of cells.
+const RECORD_FACTOR: u64 = 3;
 
 struct Placed {
     key: u64,
@@ -43,8 +46,9 @@ pub fn place_vertices(
     let mut pass = BrickPass::<ContourStats>::start(CELLS, resources)?;
     let mut numbers = pass.items() as usize..signs.len();
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    let placed = ordered(
+    let placed = ordered_by_weight(
         resources.pool,
+        resources.scales(|number: &usize| RECORD_FACTOR * signs.record_bytes(*number)),
         || {
             if resources.monitor.cancelled() {
                 return Err(ContourError::Store(StoreError::Cancelled));

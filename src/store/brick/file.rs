@@ -30,7 +30,8 @@ pub(crate) enum Bytes {
 
 impl Bytes {
     pub(crate) fn mapped(file: ScratchFile, capacity: usize) -> Self {
-        let cache = WindowCache { windows: HashMap::new(), clock: 0, capacity: capacity.max(1) };
+        let most_bytes = capacity.max(1) as u64 * WINDOW_BYTES;
+        let cache = WindowCache { windows: HashMap::new(), clock: 0, held_bytes: 0, most_bytes };
         Self::Mapped { file: Box::new(file), cache: Mutex::new(cache) }
     }
 }
@@ -38,7 +39,21 @@ impl Bytes {
 pub(crate) struct WindowCache {
     windows: HashMap<u64, (Arc<Mmap>, u64)>,
     clock: u64,
-    capacity: usize,
+    held_bytes: u64,
+    most_bytes: u64,
+}
+
+impl WindowCache {
+    /// Lets the windows go that were used longest ago, until `span` fits beside the others.
+    fn make_room(&mut self, span: u64) {
+        while self.held_bytes + span > self.most_bytes {
+            let oldest = self.windows.iter().min_by_key(|(_, (_, used))| *used);
+            let Some(start) = oldest.map(|(start, _)| *start) else { return };
+            if let Some((window, _)) = self.windows.remove(&start) {
+                self.held_bytes -= window.len() as u64;
+            }
+        }
+    }
 }
 
 impl BrickFile {
@@ -92,6 +107,12 @@ impl BrickFile {
         &self.directory
     }
 
+    /// The length of record `number`.
+    #[must_use]
+    pub fn record_bytes(&self, number: usize) -> u64 {
+        self.directory[number].len_bytes.into()
+    }
+
     /// The number of the record with `key`.
     #[must_use]
     pub fn find(&self, key: u64) -> Option<usize> {
@@ -136,14 +157,14 @@ impl BrickFile {
             *used = now;
             return Ok(Arc::clone(map));
         }
-        if cache.windows.len() >= cache.capacity {
-            let oldest = cache.windows.iter().min_by_key(|(_, (_, used))| *used);
-            let oldest = oldest.map(|(start, _)| *start);
-            oldest.and_then(|start| cache.windows.remove(&start));
-        }
+        cache.make_room(span);
         let mapped = Arc::new(map(file, start, span as usize)?);
         self.scratch.count_read(span);
-        cache.windows.insert(start, (Arc::clone(&mapped), now));
+        // One that is larger than all room lives as long as it is looked at.
+        if cache.held_bytes + span <= cache.most_bytes {
+            cache.held_bytes += span;
+            cache.windows.insert(start, (Arc::clone(&mapped), now));
+        }
         Ok(mapped)
     }
 
