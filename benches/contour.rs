@@ -13,10 +13,12 @@ use std::hint::black_box;
 use crate::support::{Nowhere, Workshop, shapes};
 
 const DEPTH: u32 = 8;
-const OPTIONS: ContourOptions = ContourOptions { method: Method::Mdc, crease_deg: 12.0 };
+const LEAVES: ContourOptions =
+    ContourOptions { method: Method::Mdc, crease_deg: 12.0, decimate_cells: 0.0 };
+const CLUSTERS: ContourOptions = ContourOptions { decimate_cells: 0.1, ..LEAVES };
 
 fn write<S: MeshSink + ?Sized>(
-    cells: &BrickFile,
+    files: (&BrickFile, &BrickFile),
     domain: &Domain,
     sink: &mut S,
     resources: &Resources,
@@ -25,7 +27,7 @@ where
     S::Error: Send,
 {
     let placed = (&ContourStats::default(), None);
-    write_surface(cells, domain, &OPTIONS, placed, sink, resources).expect("contour works")
+    write_surface(files, domain, &LEAVES, placed, sink, resources).expect("contour works")
 }
 
 fn contours(criterion: &mut Criterion) {
@@ -38,20 +40,25 @@ fn contours(criterion: &mut Criterion) {
         let (hits, _) = workshop.scan(&model);
         let flips = workshop.patch(&model, &hits);
         let (signs, stats) = workshop.sign(&model, &hits, &flips);
-        let (cells, _) = workshop.place(&model, &signs, &OPTIONS);
+        let (cells, placed) = workshop.place(&model, &signs, &LEAVES);
+        let surface = workshop.separate(&model, &signs, &cells, &LEAVES, &placed);
+        let files = (&cells, &surface);
         group.throughput(Throughput::Elements(stats.leaf_cells));
         group.bench_function(format!("{name} vertices"), |bencher| {
-            bencher.iter(|| black_box(workshop.place(&model, &signs, &OPTIONS)));
+            bencher.iter(|| black_box(workshop.place(&model, &signs, &LEAVES)));
+        });
+        group.bench_function(format!("{name} clusters"), |bencher| {
+            bencher.iter(|| black_box(workshop.place(&model, &signs, &CLUSTERS)));
         });
         group.bench_function(format!("{name} polygons"), |bencher| {
-            bencher.iter(|| write(&cells, &model.domain, &mut Nowhere::default(), &resources));
+            bencher.iter(|| write(files, &model.domain, &mut Nowhere::default(), &resources));
         });
         group.bench_function(format!("{name} polygons to PLY"), |bencher| {
             let path = workshop.folder().join("out.ply");
             bencher.iter(|| {
                 let sink = create(&path, Format::Ply, resources.scratch);
                 let mut sink = sink.expect("the folder is writable");
-                write(&cells, &model.domain, &mut *sink, &resources)
+                write(files, &model.domain, &mut *sink, &resources)
             });
         });
     }

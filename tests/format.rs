@@ -298,12 +298,18 @@ fn sign_and_cell_bricks_are_as_documented() {
     says("CellBrick", "bits  0..14  cell number");
     says("CellBrick", "bits 15..22  corner mask");
     says("CellBrick", "bit      23  a face of the cell is flipped");
-    let brick = CellBrick { cells: vec![1 << 23], positions: vec![[1, 2, 3]], offsets: vec![4] };
+    says("CellBrick", "bit      24  one vertex for all components");
+    let brick = CellBrick {
+        cells: vec![1 << 23],
+        positions: vec![[1, 2, 3]],
+        offsets: vec![4],
+        ..CellBrick::default()
+    };
     let bytes = encode(&brick);
     let cells = decode_cells(&bytes).expect("what was written validates");
     assert_eq!(size_of_val(&cells.cells[0]), 4);
     assert_eq!(size_of_val(&cells.positions[0]), 12);
     assert_eq!(size_of_val(&cells.offsets[0]), 2);
-    let beyond = CellBrick { cells: vec![1 << 24], ..CellBrick::default() };
-    assert!(decode_cells(&encode(&beyond)).is_err(), "bits 24..31 are zero");
+    let beyond = CellBrick { cells: vec![1 << 25], ..CellBrick::default() };
+    assert!(decode_cells(&encode(&beyond)).is_err(), "bits 25..31 are zero");
 }

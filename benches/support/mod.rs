@@ -4,7 +4,7 @@
 
 use std::convert::Infallible;
 
-use brickmend::contour::{ContourOptions, ContourStats, place_vertices};
+use brickmend::contour::{ContourOptions, ContourStats, place_vertices, separate};
 use brickmend::ingest::{Bins, Settled, fill_bins, read_soup, settle};
 use brickmend::mesh::shapes::{
     Corners, ListedTriangles, Random, gear, rotation, sphere, transform,
@@ -124,6 +124,20 @@ impl Workshop {
         options: &ContourOptions,
     ) -> (BrickFile, ContourStats) {
         place_vertices(signs, &model.domain, options, &self.resources()).expect("contour works")
+    }
+
+    pub fn separate(
+        &self,
+        model: &Ingested,
+        signs: &BrickFile,
+        cells: &BrickFile,
+        options: &ContourOptions,
+        placed: &ContourStats,
+    ) -> BrickFile {
+        let resources = self.resources();
+        let separated =
+            separate(signs, cells, &model.domain, options, placed, &resources);
+        separated.expect("contour works").0
     }
 }
 

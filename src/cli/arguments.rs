@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use brickmend::contour::Method;
-use brickmend::repair::{Depth, Length, Limits, Settings};
+use brickmend::repair::{Depth, Length, Limits, Reach, Settings};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
 
@@ -28,6 +28,11 @@ pub struct ResultArguments {
     /// Angle in degrees below which a crease is noise.
     #[arg(long, value_name = "DEGREES", default_value = "12", value_parser = parse_angle)]
     crease: f64,
+    /// Merge cells where no plane of the input lies farther than this from the vertex that stands
+    /// for them; in cells (0.1cells), model units, or % of the bounding box diagonal; 0 merges
+    /// none.
+    #[arg(long, value_name = "LENGTH", default_value_t = Reach::DEFAULT_DECIMATE)]
+    decimate: Reach,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
     #[arg(long)]
     strict: bool,
@@ -70,7 +75,8 @@ impl ResultArguments {
             FillRuleName::Evenodd => FillRule::Evenodd,
         };
         let (crease_deg, strict) = (self.crease, self.strict);
-        Settings { depth, fill_rule, crease_deg, method: Method::Mdc, strict }
+        let decimate = self.decimate;
+        Settings { depth, fill_rule, crease_deg, method: Method::Mdc, decimate, strict }
     }
 }
 

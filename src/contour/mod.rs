@@ -22,12 +22,18 @@ mod write;
 use serde::{Deserialize, Serialize};
 
 use crate::octree::{BrickError, Domain};
-use crate::store::{BrickFile, Resources, StoreError};
+use crate::store::{BrickFile, BrickWriter, Resources, StoreError};
 
 pub use write::{WriteError, WriteProgress, write_surface};
 
 /// Name of the brick file that [`place_vertices`] leaves.
 pub const CELLS: &str = "cells.bricks";
+
+/// Name of the brick file that [`separate`] leaves: bricks that stand for those of [`CELLS`].
+pub const SURFACE: &str = "surface.bricks";
+
+/// Names of files that [`separate`] needs while it runs.
+pub const LOOKS: [&str; 2] = mdc::LOOKS;
 
 /// How the surface is drawn from the signs.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -36,6 +42,11 @@ pub enum Method {
     /// Manifold dual contouring.
     #[default]
     Mdc,
+    /// Dual contouring: one vertex a cell.
+    Dc,
+    /// Dual marching cubes: the vertices of manifold dual contouring in the middle of their
+    /// crossings.
+    Dmc,
 }
 
 /// Settings of contouring that change the result.
@@ -45,6 +56,15 @@ pub struct ContourOptions {
     pub method: Method,
     /// Dihedral angles below this are noise.
     pub crease_deg: f64,
+    /// Largest distance of a cluster's vertex to the planes it stands for, in cells; 0 for none.
+    pub decimate_cells: f64,
+}
+
+impl ContourOptions {
+    /// Whether cells are clustered.
+    pub(crate) fn has_clusters(&self) -> bool {
+        self.method == Method::Mdc && self.decimate_cells > 0.0
+    }
 }
 
 /// What can go wrong while contouring.
@@ -88,6 +108,20 @@ pub struct ContourStats {
     pub cell_vertices: u64,
     /// Vertices that were pulled back into their cell.
     pub clamped_vertices: u64,
+    /// Cells of the octree that became one vertex, or several.
+    pub clusters: u64,
+    /// Cells that did not because a vertex would lie too far from a plane.
+    pub refused_by_error: u64,
+    /// Cells that did not because of the shape of the surface in them.
+    pub refused_by_shape: u64,
+    /// Vertices in clusters and in cells that no cluster covers.
+    pub cut_vertices: u64,
+    /// Cells whose face points are vertices, so that the surfaces in them stay apart.
+    pub flagged_cells: u64,
+    /// Clusters that were split for the same reason.
+    pub split_clusters: u64,
+    /// Vertices on faces between cells.
+    pub face_points: u64,
     /// Polygons: one per crossed edge.
     pub polygons: u64,
     /// Polygons drawn as a fan around their crossing.
@@ -106,6 +140,10 @@ impl ContourStats {
         self.flipped_faces += other.flipped_faces;
         self.cell_vertices += other.cell_vertices;
         self.clamped_vertices += other.clamped_vertices;
+        self.clusters += other.clusters;
+        self.refused_by_error += other.refused_by_error;
+        self.refused_by_shape += other.refused_by_shape;
+        self.cut_vertices += other.cut_vertices;
         self.polygons += other.polygons;
         self.fans += other.fans;
     }
@@ -121,7 +159,27 @@ pub fn place_vertices(
     options: &ContourOptions,
     resources: &Resources,
 ) -> Result<(BrickFile, ContourStats), ContourError> {
-    match options.method {
-        Method::Mdc => mdc::place_vertices(signs, domain, options, resources),
+    mdc::place_vertices(signs, domain, options, resources)
+}
+
+/// Keeps surfaces apart that pass through one cell of `cells`, which were placed from `signs`; the
+/// bricks that changed.
+///
+/// Methods that do not promise it change nothing.
+///
+/// # Errors
+/// [`ContourError`].
+pub fn separate(
+    signs: &BrickFile,
+    cells: &BrickFile,
+    domain: &Domain,
+    options: &ContourOptions,
+    placed: &ContourStats,
+    resources: &Resources,
+) -> Result<(BrickFile, ContourStats), ContourError> {
+    if options.method == Method::Mdc {
+        return mdc::separate(signs, cells, domain, options, placed, resources);
     }
+    let writer = BrickWriter::create(resources.scratch, SURFACE, resources.backing)?;
+    Ok((writer.finish(resources.cached_windows)?, *placed))
 }

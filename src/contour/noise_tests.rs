@@ -7,11 +7,13 @@ use std::convert::Infallible;
 
 use glam::DVec3;
 
-use crate::contour::mdc::table::{FLIPPED, TABLE};
-use crate::contour::{ContourOptions, ContourStats, Method, place_vertices, write_surface};
+use crate::contour::{
+    ContourOptions, ContourStats, Method, place_vertices, separate, write_surface,
+};
 use crate::mesh::shapes::{ListedTriangles, Random};
 use crate::mesh::{MeshSink, SinkState, SinkStats};
 use crate::monitor::Void;
+use crate::contour::mdc::cut_of;
 use crate::octree::{
     BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SnapBox,
     SourcePlane, decode_cells, edge_position, encode,
@@ -67,6 +69,7 @@ struct Field {
     seed: u64,
     inside_share: f64,
     patch_share: f64,
+    decimate_cells: f64,
 }
 
 impl Field {
@@ -161,13 +164,20 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
         writer.append(key, 0, &encode(&brick)).expect("room");
     }
     let signs = writer.finish(2).expect("room");
-    let options = ContourOptions { method: Method::Mdc, crease_deg: 12.0 };
+    let decimate_cells = field.decimate_cells;
+    let options = ContourOptions { method: Method::Mdc, crease_deg: 12.0, decimate_cells };
     let (cells, placed) =
         place_vertices(&signs, &domain, &options, &resources).expect("sound bricks");
-    assert_vertices_lie_in_their_cells(&cells, &domain);
+    let (surface, separated) =
+        separate(&signs, &cells, &domain, &options, &placed, &resources).expect("sound bricks");
+    for file in [&cells, &surface] {
+        assert_vertices_lie_in_their_cells(file, &domain);
+    }
     let mut kept = Kept::default();
-    let stats = write_surface(&cells, &domain, &options, (&placed, None), &mut kept, &resources)
-        .expect("sound bricks");
+    let files = (&cells, &surface);
+    let stats =
+        write_surface(files, &domain, &options, (&separated, None), &mut kept, &resources)
+            .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
     let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };
     let proof_options = ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked };
@@ -180,19 +190,15 @@ fn assert_vertices_lie_in_their_cells(cells: &BrickFile, domain: &Domain) {
     for number in 0..cells.len() {
         let view = cells.view(number).expect("readable");
         let record = decode_cells(&view).expect("a cell brick");
-        let mut positions = record.positions.iter();
-        for cell in record.cells.iter().map(|cell| cell.to_native()) {
-            let (place, mask) = ((cell & 0x7fff) as usize, (cell >> 15 & 0xff) as usize);
-            let at = [place % SIDE, place / SIDE % SIDE, place / SIDE / SIDE];
-            let table = if cell >> 23 & 1 == 1 { &FLIPPED } else { &TABLE };
-            for position in positions.by_ref().take(usize::from(table[mask].count)) {
+        for (low, side, vertices) in cut_of(record) {
+            for position in &record.positions[vertices] {
                 for a in 0..3 {
-                    let within = i64::from(position[a].to_native()) - at[a] as i64 * cell_units;
-                    assert!(0 < within && within < cell_units, "{within} of {cell_units}");
+                    let low = low[a] as i64 * cell_units;
+                    let within = i64::from(position[a].to_native()) - low;
+                    assert!(0 < within && within < side * cell_units, "{within} of {side} cells");
                 }
             }
         }
-        assert!(positions.next().is_none());
     }
 }
 
@@ -202,7 +208,6 @@ fn assert_sound(found: &Contoured, name: &str) {
     assert_eq!(proof.unused_vertices, 0, "{name}");
     assert_eq!(stats.vertices, kept.vertices.len() as u64, "{name}");
     assert_eq!(stats.triangles, kept.triangles.len() as u64, "{name}");
-    assert_eq!(stats.triangles, 2 * (stats.polygons + stats.fans), "{name}");
     assert!(stats.multi_cells > 0 && stats.fans > 0, "{name}: not much of a noise");
 }
 
@@ -211,7 +216,7 @@ fn the_surface_of_noise_is_closed_and_manifold() {
     for (seed, inside_share, patch_share) in
         [(1, 0.5, 0.5), (2, 0.2, 0.5), (3, 0.5, 0.0), (4, 0.2, 0.0), (5, 0.8, 0.1)]
     {
-        let field = Field { seed, inside_share, patch_share };
+        let field = Field { seed, inside_share, patch_share, decimate_cells: 0.0 };
         let found = contour(&field, Backing::Memory, 1);
         assert_sound(&found, &format!("{inside_share} inside, {patch_share} patched"));
         assert!(found.proof.triangles > 10_000);
@@ -220,7 +225,7 @@ fn the_surface_of_noise_is_closed_and_manifold() {
 
 #[test]
 fn noise_in_mapped_bricks_and_on_more_threads_is_the_same() {
-    let field = Field { seed: 6, inside_share: 0.5, patch_share: 0.3 };
+    let field = Field { seed: 6, inside_share: 0.5, patch_share: 0.3, decimate_cells: 0.0 };
     let one = contour(&field, Backing::Memory, 1);
     assert_sound(&one, "in memory");
     for (backing, threads) in [(Backing::Mapped, 1), (Backing::Mapped, 4), (Backing::Memory, 4)] {
@@ -232,7 +237,7 @@ fn noise_in_mapped_bricks_and_on_more_threads_is_the_same() {
 
 #[test]
 fn flipped_faces_occur_in_noise_and_are_needed() {
-    let field = Field { seed: 7, inside_share: 0.5, patch_share: 1.0 };
+    let field = Field { seed: 7, inside_share: 0.5, patch_share: 1.0, decimate_cells: 0.0 };
     let found = contour(&field, Backing::Memory, 1);
     assert_sound(&found, "all patched");
     assert!(found.stats.flipped_faces > 0 && found.stats.flipped_faces.is_multiple_of(2));

@@ -7,11 +7,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::contour::mdc::{BrickTriangles, FAN_POINT, Polygons};
+use crate::contour::mdc::{BrickTriangles, FAN_POINT, Layers, Polygons, VERTICES};
 use crate::contour::{ContourError, ContourOptions, ContourStats, Method};
 use crate::mesh::{MeshSink, SinkState};
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{BrickKey, Domain, decode_cells};
+use crate::octree::Domain;
 use crate::store::{BrickFile, Progress, Resources, StoreError, ordered_by_weight};
 
 /// What a byte of a record of cells takes as triangles.
@@ -63,7 +63,7 @@ impl WriteProgress {
 /// # Errors
 /// [`WriteError`].
 pub fn write_surface<S: MeshSink + ?Sized>(
-    cells: &BrickFile,
+    (cells, surface): (&BrickFile, &BrickFile),
     domain: &Domain,
     options: &ContourOptions,
     (placed, start): (&ContourStats, Option<WriteProgress>),
@@ -73,15 +73,16 @@ pub fn write_surface<S: MeshSink + ?Sized>(
 where
     S::Error: Send,
 {
-    let Method::Mdc = options.method;
-    let bases = number_vertices(cells)?;
+    let cells = Layers::new(cells, Some(surface));
+    let is_careful = options.method == Method::Mdc;
+    let bases = number_vertices(&cells)?;
     let vertices = u64::from(*bases.last().unwrap_or(&0));
     let (items, stats) = match start {
         Some(start) => (start.items, start.stats),
         None => (0, ContourStats { vertices, ..*placed }),
     };
     let saved_bytes = sink.bytes_so_far();
-    let mut writing = Writing { cells, domain, sink, resources, items, stats, saved_bytes };
+    let mut writing = Writing { cells, is_careful, domain, sink, resources, items, stats, saved_bytes };
     resources.monitor.advance(items);
     writing.vertices()?;
     writing.triangles(&bases)?;
@@ -89,13 +90,13 @@ where
 }
 
 /// The number of the first vertex of each brick, and their total.
-fn number_vertices(cells: &BrickFile) -> Result<Vec<u32>, StoreError> {
+fn number_vertices(cells: &Layers) -> Result<Vec<u32>, StoreError> {
     let limit = u64::from(FAN_POINT) - 1;
     let mut bases = Vec::with_capacity(cells.len() + 1);
     let mut total = 0_u64;
-    for entry in cells.directory() {
+    for number in 0..cells.len() {
         bases.push(total as u32);
-        total += u64::from(entry.flags);
+        total += u64::from(cells.flags(number) & VERTICES);
         if total > limit {
             return Err(StoreError::TooMany { what: "Output vertices", limit });
         }
@@ -106,7 +107,8 @@ fn number_vertices(cells: &BrickFile) -> Result<Vec<u32>, StoreError> {
 
 /// A surface on its way into the sink.
 struct Writing<'w, S: ?Sized> {
-    cells: &'w BrickFile,
+    cells: Layers<'w>,
+    is_careful: bool,
     domain: &'w Domain,
     sink: &'w mut S,
     resources: &'w Resources<'w>,
@@ -141,27 +143,28 @@ where
         number: usize,
         positions: &mut Vec<[f64; 3]>,
     ) -> Result<(), ContourError> {
-        let view = self.cells.view(number)?;
-        let record = decode_cells(&view)?;
-        let entry = self.cells.directory()[number];
-        let brick = BrickKey(entry.key).position();
-        if record.positions.len() != entry.flags as usize {
-            let expected = "as many vertices as the directory says";
-            return Err(ContourError::Contradiction { brick, expected });
-        }
+        let brick = self.cells.key(number).position();
+        let vertices = (self.cells.flags(number) & VERTICES) as usize;
         let base = brick.map(|c| i64::from(c) * self.domain.brick_units());
-        positions.clear();
-        positions.extend(record.positions.iter().map(|position| {
-            let at = std::array::from_fn(|a| base[a] + i64::from(position[a].to_native()));
-            self.domain.to_model(at)
-        }));
-        Ok(())
+        self.cells.read(number, |record| {
+            if record.positions.len() + record.points.len() != vertices {
+                let expected = "as many vertices as the directory says";
+                return Err(ContourError::Contradiction { brick, expected });
+            }
+            let on_faces = record.points.iter().map(|point| &point.position);
+            positions.clear();
+            positions.extend(record.positions.iter().chain(on_faces).map(|position| {
+                let at = std::array::from_fn(|a| base[a] + i64::from(position[a].to_native()));
+                self.domain.to_model(at)
+            }));
+            Ok(())
+        })
     }
 
     /// Writes the triangles of the bricks that are left.
     fn triangles(&mut self, bases: &[u32]) -> Result<(), WriteError<S::Error>> {
         let (cells, domain, resources) = (self.cells, self.domain, self.resources);
-        let with_corners = self.sink.needs_corners();
+        let (with_corners, is_careful) = (self.sink.needs_corners(), self.is_careful);
         let mut numbers = self.items as usize - cells.len()..cells.len();
         let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
         let factor = if with_corners { FACTOR_WITH_CORNERS } else { FACTOR };
@@ -174,7 +177,7 @@ where
                 }
                 Ok(numbers.next())
             },
-            || Polygons::new(cells, bases, domain, with_corners),
+            || Polygons::new(cells, bases, domain, is_careful, with_corners),
             |polygons, number| {
                 let _brick = resident.hold(1);
                 Ok(polygons.triangles(number)?)

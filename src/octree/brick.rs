@@ -1,7 +1,7 @@
 //! The records of bricks: what lies in a brick file, as rkyv archives.
 //!
-//! Three kinds, one per stage that writes them: [`HitBrick`] (scan), [`SignBrick`] (sign),
-//! [`CellBrick`] (contour). All are validated before they are read; the store has checked their
+//! One kind per stage that writes them: [`HitBrick`] (scan), [`SignBrick`] (sign), and
+//! [`crate::octree::CellBrick`] (contour). All are validated before they are read; the store has checked their
 //! hash before that.
 //!
 //! Units: positions and plane offsets in lattice units from the brick's min corner.
@@ -152,19 +152,6 @@ pub struct SignBrick {
     pub planes: Vec<SourcePlane>,
 }
 
-/// What contouring leaves of a brick: its cells with their vertices.
-#[derive(Clone, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
-pub struct CellBrick {
-    /// Cell number x + 32y + 1024z (15 bits), corner mask (8 bits at 15), flipped face flag
-    /// (1 bit at 23); ascending.
-    pub cells: Vec<u32>,
-    /// Vertex positions, cell after cell, component after component.
-    pub positions: Vec<[i32; 3]>,
-    /// Offsets of the crossings on the cells' own edges (those that leave their min corner), in
-    /// 1/65536 of the edge, cell after cell, axis after axis.
-    pub offsets: Vec<u16>,
-}
-
 type BrickSerializer<'a> = Strategy<Serializer<AlignedVec, ArenaHandle<'a>, Share>, BoxedError>;
 
 /// A brick whose archive has a size that is known before.
@@ -174,7 +161,7 @@ pub trait ArchiveSize {
 }
 
 /// Room for what an archive has besides its lists: their heads, the root, and gaps.
-const ROOT_BYTES: usize = 96;
+pub(crate) const ROOT_BYTES: usize = 96;
 
 impl ArchiveSize for HitBrick {
     fn archive_bytes(&self) -> usize {
@@ -188,13 +175,6 @@ impl ArchiveSize for SignBrick {
     }
 }
 
-impl ArchiveSize for CellBrick {
-    fn archive_bytes(&self) -> usize {
-        let lists = 4 * self.cells.len() + 12 * self.positions.len() + 2 * self.offsets.len();
-        lists + ROOT_BYTES
-    }
-}
-
 /// The archive of a brick.
 pub fn encode<B>(brick: &B) -> AlignedVec
 where
@@ -205,7 +185,7 @@ where
     rkyv::api::high::to_bytes_in::<_, BoxedError>(brick, room).expect("plain vectors serialise")
 }
 
-fn out_of_range(kind: &'static str, field: &'static str, found: u64, limit: u64) -> BrickError {
+pub(crate) fn out_of_range(kind: &'static str, field: &'static str, found: u64, limit: u64) -> BrickError {
     BrickError::OutOfRange { kind, field, found, limit }
 }
 
@@ -254,20 +234,6 @@ pub fn decode_signs(bytes: &[u8]) -> Result<&ArchivedSignBrick, BrickError> {
         }
     }
     Ok(brick)
-}
-
-/// Validates a [`CellBrick`].
-///
-/// # Errors
-/// [`BrickError`] when the bytes are none.
-pub fn decode_cells(bytes: &[u8]) -> Result<&ArchivedCellBrick, BrickError> {
-    let kind = "cell";
-    let brick = rkyv::access::<ArchivedCellBrick, BoxedError>(bytes)
-        .map_err(|source| BrickError::Invalid { kind, source })?;
-    match brick.cells.iter().find(|cell| cell.to_native() >> 24 != 0) {
-        Some(cell) => Err(out_of_range(kind, "cell", cell.to_native().into(), 1 << 24)),
-        None => Ok(brick),
-    }
 }
 
 #[cfg(test)]

@@ -3,6 +3,7 @@
 //! Nothing here knows where bytes lie; nothing here knows a file format or a stage.
 
 mod brick;
+mod cell_brick;
 mod domain;
 mod edge_bits;
 mod flips;
@@ -13,10 +14,10 @@ mod region;
 mod triangle;
 
 pub use brick::{
-    ArchiveSize, ArchivedCellBrick, ArchivedHitBrick, ArchivedSignBrick, BrickError, CellBrick,
-    Crossing, HitBrick, HitEdge, MAX_HITS, NO_PLANE, PATCH, SignBrick, SourcePlane, decode_cells,
-    decode_hits, decode_signs, encode,
+    ArchiveSize, ArchivedHitBrick, ArchivedSignBrick, BrickError, Crossing, HitBrick, HitEdge,
+    MAX_HITS, NO_PLANE, PATCH, SignBrick, SourcePlane, decode_hits, decode_signs, encode,
 };
+pub use cell_brick::{ArchivedCellBrick, CellBrick, FacePoint, MAX_LEVEL, decode_cells};
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{
     AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,

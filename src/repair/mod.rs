@@ -10,6 +10,7 @@ mod depth;
 mod error;
 mod estimate;
 mod finish;
+mod length;
 mod lock;
 mod outcome;
 mod plan;
@@ -28,4 +29,5 @@ pub use outcome::{
 };
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::repair;
-pub use settings::{Depth, Length, Limits, Settings};
+pub use length::{Length, LengthError, Reach};
+pub use settings::{Depth, Limits, Settings};

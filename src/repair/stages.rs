@@ -2,7 +2,9 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::contour::{ContourOptions, ContourStats, WriteProgress, place_vertices, write_surface};
+use crate::contour::{
+    CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate, write_surface,
+};
 use crate::defect::DefectKind;
 use crate::ingest::{
     BinEntry, Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, fill_bins,
@@ -61,6 +63,7 @@ pub struct Handles {
     hits: Option<BrickFile>,
     signs: Option<BrickFile>,
     cells: Option<BrickFile>,
+    surface: Option<BrickFile>,
 }
 
 /// The brick file in `held`, or the one that an earlier run left.
@@ -101,6 +104,7 @@ impl Run<'_> {
             Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
             Step::Sign => self.sign(workspace, findings, handles, resources)?,
             Step::Place => self.place(workspace, findings, handles, resources)?,
+            Step::Separate => self.separate(workspace, findings, handles, resources)?,
             Step::Write => self.write(workspace, findings, handles, resources)?,
             Step::Prove => self.prove(workspace, findings, resources)?,
         };
@@ -117,6 +121,7 @@ impl Run<'_> {
             Step::Patch => findings.scan.open_bricks,
             Step::Flood | Step::Sign => findings.scan.bricks,
             Step::Place => findings.sign.bricks,
+            Step::Separate => 0,
             Step::Write => 2 * findings.sign.bricks,
             Step::Prove => findings.written.triangles,
         }
@@ -138,7 +143,11 @@ impl Run<'_> {
             return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
         let (depth, bounds) = (self.settings.depth, &soup.facts.bounds);
-        findings.domain = Some(choose_domain(self.input, bounds, depth, self.format)?);
+        let domain = choose_domain(self.input, bounds, depth, self.format)?;
+        if self.settings.decimate.in_cells(bounds, &domain).is_none() {
+            return Err(RepairError::NoUnit { path: self.input.to_path_buf() });
+        }
+        findings.domain = Some(domain);
         Ok(soup.files())
     }
 
@@ -196,8 +205,14 @@ impl Run<'_> {
         RepairError::EmptyResult { path: self.input.to_path_buf(), reason }
     }
 
-    fn contour_options(&self) -> ContourOptions {
-        ContourOptions { method: self.settings.method, crease_deg: self.settings.crease_deg }
+    fn contour_options(&self, findings: &Findings) -> ContourOptions {
+        let bounds = &findings.soup().bounds;
+        let decimate_cells = self.settings.decimate.in_cells(bounds, findings.domain());
+        ContourOptions {
+            method: self.settings.method,
+            crease_deg: self.settings.crease_deg,
+            decimate_cells: decimate_cells.expect("refused when the grid was laid"),
+        }
     }
 
     fn place(
@@ -209,11 +224,28 @@ impl Run<'_> {
     ) -> Result<Vec<FileState>, RepairError> {
         let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
         let (cells, stats) =
-            place_vertices(signs, findings.domain(), &self.contour_options(), resources)
+            place_vertices(signs, findings.domain(), &self.contour_options(findings), resources)
+                .map_err(RepairError::Contour)?;
+        findings.contour = stats;
+        Ok(hand_on(cells, &mut handles.cells))
+    }
+
+    fn separate(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
+        let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
+        let (domain, options) = (findings.domain(), self.contour_options(findings));
+        let (surface, stats) =
+            separate(signs, cells, domain, &options, &findings.contour, resources)
                 .map_err(RepairError::Contour)?;
         findings.contour = stats;
         handles.signs = None;
-        Ok(hand_on(cells, &mut handles.cells))
+        Ok(hand_on(surface, &mut handles.surface))
     }
 
     fn write(
@@ -223,7 +255,8 @@ impl Run<'_> {
         handles: &mut Handles,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        let cells = open_bricks(&mut handles.cells, crate::contour::CELLS, workspace, resources)?;
+        let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
+        let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
         let start = WriteProgress::noted(resources);
         let (part, scratch) = (workspace.part(), resources.scratch);
         let sink = match &start {
@@ -232,11 +265,11 @@ impl Run<'_> {
         };
         let mut sink = sink.map_err(RepairError::Output)?;
         let placed = (&findings.contour, start);
-        let options = self.contour_options();
+        let options = self.contour_options(findings);
         findings.contour =
-            write_surface(cells, findings.domain(), &options, placed, &mut *sink, resources)
+            write_surface((cells, surface), findings.domain(), &options, placed, &mut *sink, resources)
                 .map_err(RepairError::from_write)?;
-        handles.cells = None;
+        (handles.cells, handles.surface) = (None, None);
         let written = sink.finish().map_err(RepairError::Output)?;
         self.recording.count(Counter::OutputBytesWritten, written.file.bytes);
         findings.written = written;

@@ -1,5 +1,6 @@
 //! Where a run stands, by its manifest: which steps are finished, and which files are of use.
 
+use crate::contour::LOOKS;
 use crate::io::FACES;
 use crate::mesh::SinkFile;
 use crate::repair::step::{OUTPUT_PART, Step};
@@ -8,7 +9,8 @@ use crate::store::Manifest;
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 4] = ["facts.spool", "faces.spool", "even.spool", FACES];
+pub const PASSING: [&str; 6] =
+    ["facts.spool", "faces.spool", "even.spool", FACES, LOOKS[0], LOOKS[1]];
 /// The manifest on its way to its name.
 pub const MANIFEST_NEW: &str = "manifest.new";
 

@@ -3,7 +3,7 @@
 //! A step is what a checkpoint can say of: it is finished, and its files are there. A stage that
 //! takes long is made of several.
 
-use crate::contour::CELLS;
+use crate::contour::{CELLS, SURFACE};
 use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, SOUP};
 use crate::monitor::Stage;
 use crate::octree::FLIPS;
@@ -32,6 +32,8 @@ pub enum Step {
     Sign,
     /// Signs become vertices.
     Place,
+    /// Surfaces in one cell are kept apart.
+    Separate,
     /// The surface is written.
     Write,
     /// The written file is proved.
@@ -40,7 +42,7 @@ pub enum Step {
 
 impl Step {
     /// All steps.
-    pub const ALL: [Self; 10] = [
+    pub const ALL: [Self; 11] = [
         Self::Read,
         Self::Bin,
         Self::Settle,
@@ -49,6 +51,7 @@ impl Step {
         Self::Flood,
         Self::Sign,
         Self::Place,
+        Self::Separate,
         Self::Write,
         Self::Prove,
     ];
@@ -64,6 +67,7 @@ impl Step {
             Self::Flood => "flood",
             Self::Sign => "sign",
             Self::Place => "place",
+            Self::Separate => "separate",
             Self::Write => "write",
             Self::Prove => "prove",
         }
@@ -76,7 +80,7 @@ impl Step {
             Self::Scan => Stage::Scan,
             Self::Patch => Stage::Patch,
             Self::Flood | Self::Sign => Stage::Sign,
-            Self::Place | Self::Write => Stage::Contour,
+            Self::Place | Self::Separate | Self::Write => Stage::Contour,
             Self::Prove => Stage::Verify,
         }
     }
@@ -92,6 +96,7 @@ impl Step {
             Self::Flood => &[FLOODED, REGIONS, SHEETS],
             Self::Sign => &[SIGNS],
             Self::Place => &[CELLS],
+            Self::Separate => &[SURFACE],
             Self::Write => &[OUTPUT_PART],
             Self::Prove => &[],
         }
@@ -108,7 +113,8 @@ impl Step {
             Self::Flood => &[HITS, FLIPS],
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, SHEETS],
             Self::Place => &[SIGNS],
-            Self::Write => &[CELLS],
+            Self::Separate => &[SIGNS, CELLS],
+            Self::Write => &[CELLS, SURFACE],
             Self::Prove => &[OUTPUT_PART],
         }
     }

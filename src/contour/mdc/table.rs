@@ -41,6 +41,26 @@ pub static TWO_SIDED: [u8; 256] = tabulate_two_sided();
 /// The cycles of every mask with its two-sided face, if any, turned to "separate outside".
 pub static FLIPPED: [Components; 256] = tabulate(true);
 
+/// All crossed edges of every mask as one: one vertex a cell, as in plain dual contouring.
+pub static JOINED: [Components; 256] = {
+    let mut table = tabulate(false);
+    let mut mask = 1;
+    while mask < 255 {
+        let mut edge = 0;
+        table[mask].count = 1;
+        table[mask].edge_masks = [0; 4];
+        while edge < 12 {
+            if is_marked(mask as u8, edge) {
+                table[mask].component_of_edge[edge as usize] = 0;
+                table[mask].edge_masks[0] |= 1 << edge;
+            }
+            edge += 1;
+        }
+        mask += 1;
+    }
+    table
+};
+
 /// The two other axes of `axis`, in increasing order.
 #[must_use]
 pub const fn other_axes(axis: u8) -> (u8, u8) {

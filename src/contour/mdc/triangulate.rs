@@ -36,6 +36,14 @@ pub struct Quad {
 }
 
 impl Quad {
+    /// The shorter diagonal, whether it keeps to the envelope or not.
+    pub fn shorter_diagonal(&self) -> Cut {
+        let square = |i: usize, j: usize| -> i64 {
+            (0..3).map(|a| (self.corners[i][a] - self.corners[j][a]).pow(2)).sum()
+        };
+        if square(0, 2) <= square(1, 3) { Cut::FirstThird } else { Cut::SecondFourth }
+    }
+
     /// Decides how to cut.
     pub fn cut(&self, cell_units: i64) -> Cut {
         let ring = Ring::new(self, cell_units);

@@ -1,19 +1,23 @@
-//! Places one vertex per component in every leaf cell.
+//! Places the vertices of every brick: one per component in every leaf cell, then per cluster.
 //!
 //! In:         [`crate::octree::SignBrick`]s.
-//! Out:        [`CellBrick`]s: cells with their masks, vertices on the lattice, edge offsets.
+//! Out:        [`CellBrick`]s: cells with their masks, clusters, vertices on the lattice, offsets
+//!             of crossings.
 //! Invariant:  a vertex lies strictly inside its cell, and no two share a position.
 
 use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::contour::mdc::table::{NO_FACE, TWO_SIDED, axis_of_edge, corner_of_edge};
-use crate::contour::mdc::{FLIPPED_BIT, components_of};
-use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats};
-use crate::geom::qef::{
-    Attempt, Hit, QefOptions, Waiting, begin, solve, solve_flat, solve_together,
+use crate::contour::mdc::cell::{FLIPPED_BIT, JOINED_BIT, components_of, number_at, place_of};
+use crate::contour::mdc::cluster::{
+    CellPlane, ClusterOptions, Clustering, JUDGES_ONLY, Leaves, PlaneHit,
 };
+use crate::contour::mdc::leaf_vertex::WaitingCells;
+use crate::contour::mdc::table::{NO_FACE, TWO_SIDED};
+use crate::contour::mdc::{INSET_UNITS, flags_of};
+use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method};
+use crate::geom::qef::QefOptions;
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS, SIDE,
@@ -21,14 +25,14 @@ use crate::octree::{
 };
 use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
-/// A vertex keeps this many lattice units from the walls of its cell.
-const INSET_UNITS: i64 = 2;
-
 /// What a byte of a record of signs takes while vertices are placed, with the record of cells.
 const RECORD_FACTOR: u64 = 3;
+/// The same with the pieces that clusters are made of.
+const RECORD_FACTOR_WITH_CLUSTERS: u64 = 12;
 
 struct Placed {
     key: u64,
+    flags: u32,
     bytes: rkyv::util::AlignedVec,
     stats: ContourStats,
 }
@@ -46,9 +50,11 @@ pub fn place_vertices(
     let mut pass = BrickPass::<ContourStats>::start(CELLS, resources)?;
     let mut numbers = pass.items() as usize..signs.len();
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
+    let factor =
+        if options.has_clusters() { RECORD_FACTOR_WITH_CLUSTERS } else { RECORD_FACTOR };
     let placed = ordered_by_weight(
         resources.pool,
-        resources.scales(|number: &usize| RECORD_FACTOR * signs.record_bytes(*number)),
+        resources.scales(|number: &usize| factor * signs.record_bytes(*number)),
         || {
             if resources.monitor.cancelled() {
                 return Err(ContourError::Store(StoreError::Cancelled));
@@ -58,12 +64,13 @@ pub fn place_vertices(
         || Workspace::new(domain, options),
         |space, number| {
             let _brick = resident.hold(1);
-            space.place(signs, number)
+            let (brick, stats) = space.place(signs, number, Vec::new())?;
+            let key = signs.directory()[number].key;
+            Ok(Placed { key, flags: flags_of(&brick), bytes: encode(&brick), stats })
         },
         |placed: Placed| {
             pass.counts.add(&placed.stats);
-            // The flags of the directory say how many vertices come from each brick.
-            pass.append(placed.key, placed.stats.cell_vertices as u32, &placed.bytes)?;
+            pass.append(placed.key, placed.flags, &placed.bytes)?;
             Ok(pass.item_done()?)
         },
     );
@@ -72,78 +79,74 @@ pub fn place_vertices(
 
 /// A crossing as the cells around it need it.
 #[derive(Clone, Copy)]
-struct EdgeCrossing {
+pub struct EdgeCrossing {
     /// Share of the edge.
-    offset: f64,
+    pub offset: f64,
     /// Number of its unit normal; 0, which is none, on patches.
-    normal: u32,
+    pub normal: u32,
 }
 
-/// Vertices that are placed together: enough to hide how long a root takes.
-const TOGETHER: usize = 4;
+/// Cells of a brick that the surface passes, in Morton order.
+struct Touched(Box<[u64; SIDE * SIDE * SIDE / 64]>);
 
-/// Cells whose vertices wait until there are enough of them, at the end of a brick or before.
-#[derive(Default)]
-struct WaitingCells {
-    count: usize,
-    cells: [Waiting; TOGETHER],
-    /// The cell, and the number of its vertex.
-    places: [([usize; 3], usize); TOGETHER],
-}
-
-/// Crossings of one cell: places about its centre, in cells, and numbers of normals.
-struct Around {
-    count: usize,
-    points: [DVec3; 12],
-    normals: [u32; 12],
-}
-
-impl Around {
-    fn points(&self) -> &[DVec3] {
-        &self.points[..self.count]
+impl Touched {
+    fn new() -> Self {
+        Self(Box::new([0; SIDE * SIDE * SIDE / 64]))
     }
 
-    /// The one normal of all crossings.
-    #[inline]
-    fn flat_normal(&self) -> Option<u32> {
-        let normals = &self.normals[..self.count];
-        normals.iter().all(|normal| *normal == normals[0]).then_some(normals[0])
-    }
-
-    /// The first `count` of these.
-    #[inline]
-    fn hits(&self, normals: &[DVec3]) -> [Hit; 12] {
-        let mut hits = [Hit { point: DVec3::ZERO, normal: DVec3::ZERO }; 12];
-        for (i, hit) in hits[..self.count].iter_mut().enumerate() {
-            *hit = Hit { point: self.points[i], normal: normals[self.normals[i] as usize] };
+    fn find(&mut self, marks: &EdgeBits) {
+        self.0.fill(0);
+        for z in 0..SIDE {
+            for y in 0..SIDE {
+                let row = number_at([0, y, z]);
+                let mut touched = marks.cells_touched(z, y);
+                while touched != 0 {
+                    let number = row | number_at([touched.trailing_zeros() as usize, 0, 0]);
+                    touched &= touched - 1;
+                    self.0[number / 64] |= 1 << (number % 64);
+                }
+            }
         }
-        hits
     }
 }
 
-struct Workspace {
-    cell_units: i64,
-    qef: QefOptions,
+/// What a thread needs to place the vertices of one brick after another.
+pub struct Workspace {
+    pub(super) cell_units: i64,
+    pub(super) qef: QefOptions,
+    pub(super) method: Method,
+    touched: Touched,
     marks: EdgeBits,
     signs: CornerBits,
     /// First crossing of each row of edges.
     row_starts: Vec<u32>,
     crossings: Vec<EdgeCrossing>,
     planes: Vec<SourcePlane>,
-    normals: Vec<DVec3>,
-    waiting: WaitingCells,
+    pub(super) normals: Vec<DVec3>,
+    pub(super) waiting: WaitingCells,
+    clustering: Option<Clustering>,
+    leaves: Leaves,
     /// Corner signs of bricks beyond a side, for faces that two bricks must agree on.
     beyond: HashMap<u64, CornerBits>,
 }
 
 impl Workspace {
-    fn new(domain: &Domain, options: &ContourOptions) -> Self {
+    /// A workspace for bricks of this domain.
+    pub fn new(domain: &Domain, options: &ContourOptions) -> Self {
         let cell_units = i64::from(domain.cell_units);
         let inset = 0.5 - INSET_UNITS as f64 / cell_units as f64;
         let qef = QefOptions::new(options.crease_deg, DVec3::splat(-inset), DVec3::splat(inset));
+        let cluster_options = ClusterOptions {
+            threshold_cells: options.decimate_cells,
+            qef,
+            cell_units,
+            inset_units: INSET_UNITS,
+        };
         Self {
             cell_units,
             qef,
+            method: options.method,
+            touched: Touched::new(),
             marks: EdgeBits::default(),
             signs: CornerBits::default(),
             row_starts: vec![0; 3 * ROWS],
@@ -151,30 +154,49 @@ impl Workspace {
             planes: Vec::new(),
             normals: Vec::new(),
             waiting: WaitingCells::default(),
+            clustering: options.has_clusters().then(|| Clustering::new(cluster_options)),
+            leaves: Leaves::default(),
             beyond: HashMap::new(),
         }
     }
 
-    fn place(&mut self, signs: &BrickFile, number: usize) -> Result<Placed, ContourError> {
+    /// The cells of brick `number` with their vertices; none of the `banned` cells is a cluster.
+    ///
+    /// # Errors
+    /// [`ContourError`].
+    pub fn place(
+        &mut self,
+        signs: &BrickFile,
+        number: usize,
+        banned: Vec<u32>,
+    ) -> Result<(CellBrick, ContourStats), ContourError> {
         let key = signs.directory()[number].key;
         let view = signs.view(number)?;
         let record = decode_signs(&view)?;
         self.load(record);
         self.beyond.clear();
+        self.touched.find(&self.marks);
         let mut stats = ContourStats::default();
-        let mut brick = CellBrick::default();
-        for z in 0..SIDE {
-            for y in 0..SIDE {
-                let mut touched = self.marks.cells_touched(z, y);
-                while touched != 0 {
-                    let at = [touched.trailing_zeros() as usize, y, z];
-                    touched &= touched - 1;
-                    self.place_in_cell(signs, BrickKey(key), at, &mut brick, &mut stats)?;
-                }
+        let mut brick = CellBrick { banned, ..CellBrick::default() };
+        for word in 0..self.touched.0.len() {
+            let mut bits = self.touched.0[word];
+            while bits != 0 {
+                let number = word * 64 + bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                self.place_in_cell(signs, BrickKey(key), number, &mut brick, &mut stats)?;
             }
         }
         self.place_waiting(&mut brick, &mut stats);
-        Ok(Placed { key, bytes: encode(&brick), stats })
+        if let Some(clustering) = &mut self.clustering {
+            self.leaves.components.push(brick.positions.len() as u32);
+            self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
+            clustering.cut(&mut brick, &self.leaves);
+            stats.refused_by_error += clustering.refusals.by_error;
+            stats.refused_by_shape += clustering.refusals.by_shape;
+        }
+        stats.clusters += brick.clusters.len() as u64;
+        stats.cut_vertices += brick.positions.len() as u64;
+        Ok((brick, stats))
     }
 
     /// Signs, marks and crossings of the record.
@@ -207,11 +229,50 @@ impl Workspace {
         }
         self.row_starts[row..].fill(self.crossings.len() as u32);
         self.signs.from_marks(&self.marks, record.base_inside);
+        if self.clustering.is_some() {
+            self.begin_leaves();
+        }
+    }
+
+    /// The planes of the brick in cells; no leaf yet.
+    fn begin_leaves(&mut self) {
+        let leaves = &mut self.leaves;
+        leaves.components.clear();
+        leaves.hit_starts.clear();
+        leaves.hits.clear();
+        leaves.planes.clear();
+        let cell_units = self.cell_units as f64;
+        leaves.planes.extend(self.planes.iter().zip(&self.normals[1..]).map(|(plane, &normal)| {
+            CellPlane { normal, offset: plane.offset / cell_units }
+        }));
+    }
+
+    /// Adds the components of a cell to the leaves, before their vertices are placed.
+    fn add_leaf(&mut self, at: [usize; 3], mask: u8, edge_masks: &[u16], first: usize) {
+        self.leaves.components.push(first as u32);
+        let low = DVec3::from(at.map(|c| c as f64)) + 0.5;
+        for &edges in edge_masks {
+            self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
+            let around = self.around(at, edges);
+            for i in 0..around.count {
+                let point = around.points[i] + low;
+                let plane = match around.normals[i] {
+                    0 => {
+                        // A patch has no plane: the signs around tell how the surface faces.
+                        let normal = gradient(mask);
+                        self.leaves.planes.push(CellPlane { normal, offset: normal.dot(point) });
+                        (self.leaves.planes.len() - 1) as u32 | JUDGES_ONLY
+                    }
+                    normal => normal - 1,
+                };
+                self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
+            }
+        }
     }
 
     /// The crossing of a marked edge.
     #[inline]
-    fn crossing(&self, axis: usize, at: [usize; 3]) -> EdgeCrossing {
+    pub(super) fn crossing(&self, axis: usize, at: [usize; 3]) -> EdgeCrossing {
         let row = at[2] * LINES + at[1];
         let below = self.marks.rows(axis)[row] & ((1 << at[0]) - 1);
         let rank = self.row_starts[axis * ROWS + row] + below.count_ones();
@@ -222,21 +283,29 @@ impl Workspace {
         &mut self,
         signs: &BrickFile,
         key: BrickKey,
-        at: [usize; 3],
+        number: usize,
         brick: &mut CellBrick,
         stats: &mut ContourStats,
     ) -> Result<(), ContourError> {
+        let at = place_of(number);
         let mask = self.signs.cell_mask(at);
-        let mut cell = (at[0] + SIDE * (at[1] + SIDE * at[2])) as u32 | u32::from(mask) << 15;
-        if self.is_flipped(signs, key, at, mask)? {
+        let mut cell = number as u32 | u32::from(mask) << 15;
+        if self.method == Method::Dc {
+            cell |= JOINED_BIT;
+        } else if self.is_flipped(signs, key, at, mask)? {
             cell |= FLIPPED_BIT;
             stats.flipped_faces += 1;
         }
         let components = components_of(cell);
-        if components.count == 1 {
+        let masks = &components.edge_masks[..usize::from(components.count)];
+        if self.clustering.is_some() {
+            self.add_leaf(at, mask, masks, brick.positions.len());
+        }
+        if self.method == Method::Dmc {
+            self.place_in_middle(at, masks, brick);
+        } else if components.count == 1 {
             self.place_alone(at, components.edge_masks[0], brick, stats);
         } else {
-            let masks = &components.edge_masks[..usize::from(components.count)];
             self.place_apart(at, masks, brick, stats);
         }
         for axis in 0..3 {
@@ -303,150 +372,13 @@ impl Workspace {
         self.beyond.insert(neighbour.0, corners);
         Ok(mask)
     }
+}
 
-    /// The vertex of the only component of a cell, now or with others that wait.
-    fn place_alone(
-        &mut self,
-        at: [usize; 3],
-        edges: u16,
-        brick: &mut CellBrick,
-        stats: &mut ContourStats,
-    ) {
-        let around = self.around(at, edges);
-        let attempt = match around.flat_normal() {
-            Some(normal) => {
-                let normal = self.normals[normal as usize];
-                solve_flat(around.points(), normal, &self.qef).map(Attempt::Done)
-            }
-            None => None,
-        };
-        let attempt = attempt.unwrap_or_else(|| {
-            let hits = around.hits(&self.normals);
-            begin(&hits[..around.count], &self.qef)
-        });
-        match attempt {
-            Attempt::Done(solution) => {
-                brick.positions.push(self.to_lattice(at, solution.position));
-                stats.clamped_vertices += u64::from(solution.clamped);
-            }
-            Attempt::Waiting(cell) => {
-                let waiting = &mut self.waiting;
-                waiting.cells[waiting.count] = cell;
-                waiting.places[waiting.count] = (at, brick.positions.len());
-                waiting.count += 1;
-                brick.positions.push([0; 3]);
-                if self.waiting.count == TOGETHER {
-                    self.place_waiting(brick, stats);
-                }
-            }
-        }
-    }
-
-    fn place_waiting(&mut self, brick: &mut CellBrick, stats: &mut ContourStats) {
-        if self.waiting.count == 0 {
-            return;
-        }
-        let solutions = solve_together(&self.waiting.cells, &self.qef);
-        let places = self.waiting.places[..self.waiting.count].iter();
-        for (&(at, number), solution) in places.zip(solutions) {
-            brick.positions[number] = self.to_lattice(at, solution.position);
-            stats.clamped_vertices += u64::from(solution.clamped);
-        }
-        self.waiting.count = 0;
-    }
-
-    /// The vertices of a cell with several components.
-    fn place_apart(
-        &self,
-        at: [usize; 3],
-        edge_masks: &[u16],
-        brick: &mut CellBrick,
-        stats: &mut ContourStats,
-    ) {
-        let first = brick.positions.len();
-        for &edges in edge_masks {
-            let around = self.around(at, edges);
-            let hits = &around.hits(&self.normals)[..around.count];
-            let solution = solve(hits, &self.within_crossings(hits));
-            let position = self.to_lattice(at, solution.position);
-            let outward = hits.iter().fold(DVec3::ZERO, |sum, hit| sum + hit.normal);
-            let position = self.apart_from(position, at, outward, &brick.positions[first..]);
-            brick.positions.push(position);
-            stats.clamped_vertices += u64::from(solution.clamped);
-        }
-    }
-
-    /// The crossings on these edges of a cell.
-    #[inline]
-    fn around(&self, at: [usize; 3], edges: u16) -> Around {
-        let mut around = Around { count: 0, points: [DVec3::ZERO; 12], normals: [0; 12] };
-        let mut left = edges;
-        while left != 0 {
-            let edge = left.trailing_zeros() as u8;
-            left &= left - 1;
-            let axis = usize::from(axis_of_edge(edge));
-            let corner = corner_of_edge(edge, 0);
-            let corner = [0, 1, 2].map(|a| usize::from(corner >> a & 1));
-            let crossing = self.crossing(axis, [0, 1, 2].map(|a| at[a] + corner[a]));
-            let mut point = DVec3::from(corner.map(|c| c as f64 - 0.5));
-            point[axis] = crossing.offset - 0.5;
-            around.points[around.count] = point;
-            around.normals[around.count] = crossing.normal;
-            around.count += 1;
-        }
-        around
-    }
-
-    /// Where several components share a cell, each stays in the box of its own crossings: there
-    /// they cannot pass one another.
-    fn within_crossings(&self, hits: &[Hit]) -> QefOptions {
-        let first = hits[0].point;
-        let (lo, hi) = hits
-            .iter()
-            .fold((first, first), |(lo, hi), hit| (lo.min(hit.point), hi.max(hit.point)));
-        let QefOptions { lo: cell_lo, hi: cell_hi, .. } = self.qef;
-        let mut options = self.qef;
-        options.lo = lo.clamp(cell_lo, cell_hi);
-        options.hi = hi.clamp(cell_lo, cell_hi);
-        options
-    }
-
-    /// Rounds to the lattice, strictly inside the cell.
-    fn to_lattice(&self, at: [usize; 3], position: DVec3) -> [i32; 3] {
-        std::array::from_fn(|a| {
-            let units = ((position[a] + 0.5) * self.cell_units as f64).round() as i64;
-            let units = units.clamp(INSET_UNITS, self.cell_units - INSET_UNITS);
-            (at[a] as i64 * self.cell_units + units) as i32
-        })
-    }
-
-    /// Moves a vertex whose place another component of the cell has taken, toward its inside.
-    fn apart_from(
-        &self,
-        position: [i32; 3],
-        at: [usize; 3],
-        outward: DVec3,
-        taken: &[[i32; 3]],
-    ) -> [i32; 3] {
-        if !taken.contains(&position) {
-            return position;
-        }
-        let mut axes = [0, 1, 2];
-        axes.sort_by(|&a, &b| outward[b].abs().total_cmp(&outward[a].abs()));
-        for step in 1..=taken.len() as i32 + 1 {
-            for axis in axes {
-                let inward = if outward[axis] > 0.0 { -1 } else { 1 };
-                for direction in [inward, -inward] {
-                    let mut moved = position;
-                    moved[axis] += direction * step;
-                    let low = at[axis] as i64 * self.cell_units;
-                    let within = i64::from(moved[axis]) - low;
-                    if within > 0 && within < self.cell_units && !taken.contains(&moved) {
-                        return moved;
-                    }
-                }
-            }
-        }
-        unreachable!("a cell has room for four vertices")
-    }
+/// The way from inside to outside in a cell, by the signs of its corners; of unit length.
+fn gradient(mask: u8) -> DVec3 {
+    let sum = (0..8).fold(DVec3::ZERO, |sum, corner| {
+        let at = DVec3::from([0, 1, 2].map(|a| f64::from(corner >> a & 1) - 0.5));
+        if mask >> corner & 1 == 1 { sum - at } else { sum + at }
+    });
+    sum.normalize_or(DVec3::X)
 }

@@ -1,0 +1,255 @@
+//! Polygons around crossed edges between cells of any size, and the arcs between their vertices.
+//!
+//! Two neighbouring cells of the cut share a face, that of the smaller one: the minimal face. The
+//! pieces of surface in the two meet there in an arc. The segment between their vertices passes the
+//! minimal face, or a face point on it must be a vertex: always where one of the cells is flagged.
+//!
+//! Units: places in cells, positions in lattice units, from the own brick's min corner.
+//! Source: Ju and Udeshi 2006 (face vertices and minimal edges); the rest is ours.
+
+use crate::contour::ContourError;
+use crate::contour::mdc::cell::{edge_in_cell, lower_end, segments_on};
+use crate::contour::mdc::loaded::face_point_key;
+use crate::contour::mdc::neighbourhood::{CutBox, Neighbourhood, Patch};
+use crate::contour::mdc::table::axis_of_edge;
+
+/// An edge of the grid: its direction and its lower end.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Edge {
+    /// The axis that it runs along.
+    pub axis: usize,
+    /// Its lower end.
+    pub lower: [i32; 3],
+}
+
+impl Edge {
+    /// The four cells around it, counted around its direction: (-,-), (+,-), (+,+), (-,+) on the two
+    /// axes after its own.
+    #[inline]
+    fn cells(&self) -> [[i32; 3]; 4] {
+        let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
+        [(1, 1), (0, 1), (0, 0), (1, 0)].map(|(du, dv)| {
+            let mut at = self.lower;
+            at[u] -= du;
+            at[v] -= dv;
+            at
+        })
+    }
+}
+
+/// The arc between two cells of the cut.
+#[derive(Clone, Copy, Debug)]
+pub struct Arc {
+    /// The axis across the face.
+    pub axis: usize,
+    /// The vertex below the face.
+    pub lower: Patch,
+    /// The vertex above it.
+    pub upper: Patch,
+}
+
+impl Arc {
+    /// The key of its face point in the brick that owns the face, that of the upper cell.
+    pub fn key(&self) -> u64 {
+        let is_beyond = self.lower.slot != self.upper.slot;
+        let (upper, lower) = (self.upper.vertex.number, self.lower.vertex.number);
+        face_point_key(self.axis, is_beyond, upper, lower)
+    }
+
+    /// The minimal face as the box of the smaller cell, and its plane.
+    fn face(&self) -> (CutBox, i32) {
+        let (lower, upper) = (self.lower.cut_box(), self.upper.cut_box());
+        let smaller = if lower.side < upper.side { lower } else { upper };
+        (smaller, upper.low[self.axis])
+    }
+
+    /// Whether the face point is a vertex.
+    pub fn is_explicit(&self, cell_units: i32) -> bool {
+        let (lower, upper) = (self.lower.vertex.cut, self.upper.vertex.cut);
+        lower.is_flagged() || upper.is_flagged() || !self.passes(cell_units)
+    }
+
+    /// Whether the segment between the two vertices passes strictly through the minimal face.
+    pub fn passes(&self, cell_units: i32) -> bool {
+        if self.lower.vertex.cut.level() == self.upper.vertex.cut.level() {
+            // The union of two equal cells is convex.
+            return true;
+        }
+        let (face, plane) = self.face();
+        let from = self.lower.vertex.position.map(i64::from);
+        let to = self.upper.vertex.position.map(i64::from);
+        let cell = i64::from(cell_units);
+        let whole = to[self.axis] - from[self.axis];
+        let part = i64::from(plane) * cell - from[self.axis];
+        (0..3).filter(|a| *a != self.axis).all(|a| {
+            let at = from[a] * whole + part * (to[a] - from[a]);
+            let low = i64::from(face.low[a]) * cell;
+            let high = low + i64::from(face.side) * cell;
+            low * whole < at && at < high * whole
+        })
+    }
+
+    /// The face point of an arc that leaves its face at these two crossings.
+    pub fn point(&self, ends: [[i32; 3]; 2], cell_units: i32) -> [i32; 3] {
+        let (face, plane) = self.face();
+        let [p, q] = ends.map(|end| end.map(i64::from));
+        let cell = i64::from(cell_units);
+        let middle: [i64; 3] = std::array::from_fn(|a| (p[a] + q[a]) / 2);
+        let low = face.low.map(|c| i64::from(c) * cell);
+        let side = i64::from(face.side) * cell;
+        let is_inside = (0..3)
+            .filter(|a| *a != self.axis)
+            .all(|a| low[a] < middle[a] && middle[a] < low[a] + side);
+        let at: [i64; 3] = if is_inside {
+            middle
+        } else {
+            std::array::from_fn(|a| (p[a] + q[a] + 2 * low[a] + side) / 4)
+        };
+        let mut at = at.map(|c| c as i32);
+        at[self.axis] = plane * cell_units;
+        at
+    }
+
+    /// Whether the arc ends at an edge of the fine face below cell `above`: not if it goes on
+    /// between the same two cells beyond the edge.
+    pub fn ends_at(&self, edge: &Edge, above: [i32; 3]) -> bool {
+        let across = 3 - self.axis - edge.axis;
+        let step = if edge.lower[across] > above[across] { 1 } else { -1 };
+        let mut upper = above;
+        upper[across] += step;
+        let mut lower = upper;
+        lower[self.axis] -= 1;
+        !(self.upper.cut_box().holds(upper) && self.lower.cut_box().holds(lower))
+    }
+}
+
+impl Arc {
+    /// The crossings where the arc leaves its face, of which `edge` is one; the fine face there
+    /// lies below cell `above`.
+    ///
+    /// # Errors
+    /// [`ContourError::Contradiction`].
+    pub fn ends(
+        &self,
+        nb: &mut Neighbourhood,
+        edge: Edge,
+        above: [i32; 3],
+    ) -> Result<[[i32; 3]; 2], ContourError> {
+        let (mut here, mut cell) = (edge, above);
+        loop {
+            let found = nb.cell(cell)?;
+            let number = edge_in_cell(here.axis, here.lower, cell);
+            let pairs = segments_on(nb.packed(found), 2 * self.axis).pairs();
+            let pair = pairs.iter().find(|pair| pair.contains(&number));
+            let pair = *pair.ok_or_else(|| nb.contradiction("a segment on a crossed face"))?;
+            let [one, other] = edges_of(pair, cell);
+            here = if one == here { other } else { one };
+            if self.ends_at(&here, cell) {
+                break;
+            }
+            let across = 3 - self.axis - here.axis;
+            cell[across] += if here.lower[across] > cell[across] { 1 } else { -1 };
+        }
+        Ok([nb.crossing(edge.axis, edge.lower)?.0, nb.crossing(here.axis, here.lower)?.0])
+    }
+}
+
+/// The edges of a cell that a segment on one of its faces joins.
+pub fn edges_of(pair: [u8; 2], at: [i32; 3]) -> [Edge; 2] {
+    pair.map(|edge| Edge { axis: usize::from(axis_of_edge(edge)), lower: lower_end(at, edge) })
+}
+
+/// A polygon around a crossed edge: three or four vertices, seen from the edge's upper end.
+pub struct Polygon {
+    /// The edge.
+    pub edge: Edge,
+    /// How many vertices.
+    pub count: usize,
+    patches: [Patch; 4],
+    /// In which of the four cells around the edge each vertex' turn ends.
+    last: [u8; 4],
+}
+
+impl Polygon {
+    /// The polygon around an edge; `None` if its cells have fewer than three vertices.
+    ///
+    /// # Errors
+    /// [`ContourError::Contradiction`].
+    pub fn around(nb: &mut Neighbourhood, edge: Edge) -> Result<Option<Self>, ContourError> {
+        let mut ring = [None; 4];
+        for (slot, at) in ring.iter_mut().zip(edge.cells()) {
+            let found = nb.cell(at)?;
+            *slot = Some(nb.vertex(found, edge_in_cell(edge.axis, edge.lower, at)));
+        }
+        Ok(Self::of_ring(edge, ring.map(|patch| patch.expect("all four are found"))))
+    }
+
+    /// The polygon of these four vertices; `None` if fewer than three differ.
+    pub fn of_ring(edge: Edge, ring: [Patch; 4]) -> Option<Self> {
+        let mut polygon = Self { edge, count: 0, patches: ring, last: [0; 4] };
+        for slot in 0..4 {
+            // A vertex stands where its turn ends.
+            if ring[slot].id() != ring[(slot + 1) % 4].id() {
+                polygon.patches[polygon.count] = ring[slot];
+                polygon.last[polygon.count] = slot as u8;
+                polygon.count += 1;
+            }
+        }
+        (polygon.count >= 3).then_some(polygon)
+    }
+
+    /// The vertices in order.
+    pub fn patches(&self) -> &[Patch] {
+        &self.patches[..self.count]
+    }
+
+    /// The arc from vertex `i` to the next.
+    pub fn arc(&self, i: usize) -> Arc {
+        let (this, next) = (self.patches[i], self.patches[(i + 1) % self.count]);
+        let (u, v) = ((self.edge.axis + 1) % 3, (self.edge.axis + 2) % 3);
+        // From (-,-) up along u, up along v, down along u, down along v.
+        let (axis, is_up) = [(u, true), (v, true), (u, false), (v, false)][usize::from(self.last[i])];
+        if is_up {
+            Arc { axis, lower: this, upper: next }
+        } else {
+            Arc { axis, lower: next, upper: this }
+        }
+    }
+
+    /// Whether the segment of an arc misses its face and vertex `own` is not at that arc. Such a
+    /// polygon is a fan if `own` shares its cell with others: the cell cannot see the face point.
+    pub fn has_missed_arc_off(&self, own: usize, cell_units: i32) -> bool {
+        let before = (own + self.count - 1) % self.count;
+        (0..self.count).any(|i| i != own && i != before && !self.arc(i).passes(cell_units))
+    }
+
+    /// The minimal edge, which all cells around share, from end to end; `None` if the surface
+    /// crosses it more than once.
+    ///
+    /// # Errors
+    /// [`ContourError::Contradiction`].
+    pub fn minimal_edge(
+        &self,
+        nb: &mut Neighbourhood,
+    ) -> Result<Option<[[i32; 3]; 2]>, ContourError> {
+        let Edge { axis, lower } = self.edge;
+        let boxes = self.patches().iter().map(Patch::cut_box);
+        let (low, high) = boxes.fold((i32::MIN, i32::MAX), |(low, high), cut| {
+            (low.max(cut.low[axis]), high.min(cut.low[axis] + cut.side))
+        });
+        for along in (low..high).filter(|along| *along != lower[axis]) {
+            let mut other = lower;
+            other[axis] = along;
+            if nb.is_crossed(axis, other)? {
+                return Ok(None);
+            }
+        }
+        let cell = nb.cell_units();
+        Ok(Some([low, high].map(|along| {
+            let mut end = lower;
+            end[axis] = along;
+            end.map(|c| c * cell)
+        })))
+    }
+}
+

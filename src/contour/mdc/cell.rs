@@ -1,0 +1,218 @@
+//! Cells as they are packed in records, and how their faces join their crossed edges.
+
+use crate::contour::mdc::table::{
+    Components, FLIPPED, JOINED, TABLE, TWO_SIDED, corner_of_edge, corners_of_face, edge_at_corner,
+    edges_of_face, is_ambiguous, is_marked, other_axes,
+};
+
+/// Flag of a cell whose two-sided face is flipped, beside its number and mask.
+pub const FLIPPED_BIT: u32 = 1 << 23;
+
+/// Flag of a cell whose components share one vertex, beside its number and mask.
+pub const JOINED_BIT: u32 = 1 << 24;
+
+/// Morton bits of a coordinate below 32.
+const SPREAD: [u16; 32] = {
+    let mut spread = [0; 32];
+    let mut c = 0;
+    while c < 32 {
+        let x = c as u16;
+        spread[c] = x & 1 | (x & 2) << 2 | (x & 4) << 4 | (x & 8) << 6 | (x & 16) << 8;
+        c += 1;
+    }
+    spread
+};
+
+/// The components of a packed cell.
+#[inline]
+pub fn components_of(cell: u32) -> &'static Components {
+    let mask = (cell >> 15 & 0xff) as usize;
+    match cell & (FLIPPED_BIT | JOINED_BIT) {
+        0 => &TABLE[mask],
+        FLIPPED_BIT => &FLIPPED[mask],
+        _ => &JOINED[mask],
+    }
+}
+
+/// The number of a packed cell in its brick, in Morton order.
+#[inline]
+pub const fn cell_number(cell: u32) -> usize {
+    (cell & 0x7fff) as usize
+}
+
+/// The corner mask of a packed cell.
+#[inline]
+pub const fn cell_mask(cell: u32) -> u8 {
+    (cell >> 15 & 0xff) as u8
+}
+
+/// The Morton number of the cell at a place in its brick.
+#[inline]
+pub const fn number_at(at: [usize; 3]) -> usize {
+    (SPREAD[at[0]] | SPREAD[at[1]] << 1 | SPREAD[at[2]] << 2) as usize
+}
+
+/// The place in its brick of a cell with this Morton number.
+#[inline]
+pub const fn place_of(number: usize) -> [usize; 3] {
+    [gather(number), gather(number >> 1), gather(number >> 2)]
+}
+
+#[inline]
+const fn gather(bits: usize) -> usize {
+    let x = bits & 0x1249;
+    let x = (x | x >> 2) & 0x10c3;
+    let x = (x | x >> 4) & 0x100f;
+    (x | x >> 8) & 0x1f
+}
+
+/// Of every corner mask, along how many axes the edge from the min corner is crossed.
+pub static OWN_EDGES: [u8; 256] = {
+    let mut counts = [0; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let mut axis = 0;
+        while axis < 3 {
+            counts[mask] += ((mask ^ mask >> (1 << axis)) & 1) as u8;
+            axis += 1;
+        }
+        mask += 1;
+    }
+    counts
+};
+
+/// Which faces of every corner mask have all four edges crossed, as bits.
+pub static AMBIGUOUS_FACES: [u8; 256] = {
+    let mut faces = [0; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        let mut face = 0;
+        while face < 6 {
+            faces[mask] |= (is_ambiguous(mask as u8, face) as u8) << face;
+            face += 1;
+        }
+        mask += 1;
+    }
+    faces
+};
+
+/// The pairs of crossed edges that a face joins, by their numbers in the cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segments {
+    count: u8,
+    pairs: [[u8; 2]; 2],
+}
+
+impl Segments {
+    /// The pairs.
+    #[inline]
+    pub fn pairs(&self) -> &[[u8; 2]] {
+        &self.pairs[..usize::from(self.count)]
+    }
+}
+
+/// Of every mask and face, without and with the flip of its two-sided face.
+static SEGMENTS: [[[Segments; 6]; 256]; 2] = {
+    let none = Segments { count: 0, pairs: [[0; 2]; 2] };
+    let mut all = [[[none; 6]; 256]; 2];
+    let mut mask = 0;
+    while mask < 256 {
+        let mut face = 0;
+        while face < 6 {
+            let flips = TWO_SIDED[mask] == face as u8;
+            all[0][mask][face] = segments(mask as u8, face as u8, false);
+            all[1][mask][face] = segments(mask as u8, face as u8, flips);
+            face += 1;
+        }
+        mask += 1;
+    }
+    all
+};
+
+const fn segments(mask: u8, face: u8, flipped: bool) -> Segments {
+    let mut out = Segments { count: 0, pairs: [[0; 2]; 2] };
+    if is_ambiguous(mask, face) {
+        let (first, second) = other_axes(face / 2);
+        let corners = corners_of_face(face);
+        let mut i = 0;
+        while i < 4 {
+            let inside = mask >> corners[i] & 1 == 1;
+            if inside != flipped {
+                out.pairs[out.count as usize] =
+                    [edge_at_corner(corners[i], first), edge_at_corner(corners[i], second)];
+                out.count += 1;
+            }
+            i += 1;
+        }
+        return out;
+    }
+    let edges = edges_of_face(face);
+    let mut found = 0;
+    let mut i = 0;
+    while i < 4 {
+        if is_marked(mask, edges[i]) {
+            out.pairs[0][found] = edges[i];
+            found += 1;
+        }
+        i += 1;
+    }
+    out.count = (found == 2) as u8;
+    out
+}
+
+/// How `face` of a packed cell joins its crossed edges.
+#[inline]
+pub fn segments_on(cell: u32, face: usize) -> &'static Segments {
+    &SEGMENTS[usize::from(cell & FLIPPED_BIT != 0)][usize::from(cell_mask(cell))][face]
+}
+
+/// The lower end of `edge` of the cell at `at`.
+#[inline]
+pub fn lower_end(at: [i32; 3], edge: u8) -> [i32; 3] {
+    let corner = corner_of_edge(edge, 0);
+    [0, 1, 2].map(|a| at[a] + i32::from(corner >> a & 1))
+}
+
+/// The edge along `axis` from the corner `lower`, as a number in the cell at `at`.
+#[inline]
+pub fn edge_in_cell(axis: usize, lower: [i32; 3], at: [i32; 3]) -> u8 {
+    let corner = (0..3).fold(0, |bits, a| bits | ((lower[a] - at[a]) as u8 & 1) << a);
+    edge_at_corner(corner, axis as u8)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::contour::mdc::table::components;
+
+    #[test]
+    fn numbers_and_places_are_each_others_inverse() {
+        for number in 0..32_768 {
+            assert_eq!(number_at(place_of(number)), number);
+        }
+    }
+
+    #[test]
+    fn segments_join_the_edges_of_one_component_and_every_marked_edge_twice() {
+        for mask in 0..=255_u8 {
+            for flipped in [false, true] {
+                let cell = u32::from(mask) << 15 | if flipped { FLIPPED_BIT } else { 0 };
+                let face = if flipped { TWO_SIDED[usize::from(mask)] } else { 255 };
+                let expected = components(mask, face);
+                let mut seen = [0; 12];
+                for face in 0..6 {
+                    for &[a, b] in segments_on(cell, face).pairs() {
+                        let of = |edge: u8| expected.component_of_edge[usize::from(edge)];
+                        assert_eq!(of(a), of(b), "{mask:#x} {face}");
+                        seen[usize::from(a)] += 1;
+                        seen[usize::from(b)] += 1;
+                    }
+                }
+                for (edge, seen) in seen.into_iter().enumerate() {
+                    assert_eq!(seen == 2, is_marked(mask, edge as u8));
+                    assert_eq!(seen == 0, !is_marked(mask, edge as u8));
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,430 @@
+//! Clusters: one vertex for all the surface in a cell of the octree, where nothing is lost by it.
+//!
+//! In:         the leaf cells of a brick with their vertices and the planes of their crossings.
+//! Out:        the [`Cut`]: which cells have vertices, and those vertices.
+//! Invariant:  a cell is in the cut if it is the topmost one of which every piece of surface is a
+//!             disk with one arc per face at most, and has a vertex within the threshold of all its
+//!             planes. So two vertices share at most one arc, and the cells of the cut tile the
+//!             surface. The result depends on the brick alone.
+//! Units:      cells; vertices in lattice units.
+//! Memory:     a path down the octree: about 600 bytes a piece of surface in the brick.
+//! Fails:      never.
+//! Source:     Schaefer, Ju, Warren 2007 (vertex clustering); the cut of whole cells and the third
+//!             rule are additions of ours.
+
+mod cut;
+mod node;
+mod planes;
+
+#[cfg(test)]
+mod tests;
+
+use std::ops::Range;
+
+use glam::DVec3;
+
+pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
+
+use crate::contour::mdc::cell::{
+    AMBIGUOUS_FACES, cell_mask, cell_number, components_of, number_at, place_of, segments_on,
+};
+use crate::contour::mdc::cluster::cut::{Cut, Mark};
+use crate::contour::mdc::cluster::node::Node;
+use crate::contour::mdc::cluster::planes::{Group, add_group, largest_distance, place};
+use crate::geom::qef::QefOptions;
+use crate::octree::{CellBrick, MAX_LEVEL, SIDE};
+
+/// Where no leaf cell is.
+const NO_RANK: u16 = u16::MAX;
+
+/// How clusters are judged.
+#[derive(Clone, Copy, Debug)]
+pub struct ClusterOptions {
+    /// Largest distance of a vertex to the planes that it stands for, in cells.
+    pub threshold_cells: f64,
+    /// Rank and crease; its box is not used.
+    pub qef: QefOptions,
+    /// Lattice units of a cell, and of the gap that a vertex keeps from its cell's walls.
+    pub cell_units: i64,
+    /// See `cell_units`.
+    pub inset_units: i64,
+}
+
+/// The leaf cells of a brick, in Morton order.
+#[derive(Default)]
+pub struct Leaves {
+    /// Planes that hits name.
+    pub planes: Vec<CellPlane>,
+    /// First component of every cell, and their total.
+    pub components: Vec<u32>,
+    /// First hit of every component, and their total.
+    pub hit_starts: Vec<u32>,
+    /// Crossings, component after component.
+    pub hits: Vec<PlaneHit>,
+}
+
+/// Why pieces of surface are not one vertex.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Refusals {
+    /// Cells in which a vertex would lie too far from a plane, or there are too many planes.
+    pub by_error: u64,
+    /// Cells in which a piece is no disk, or meets a face more than once.
+    pub by_shape: u64,
+}
+
+/// Makes the cut of one brick after another.
+pub struct Clustering {
+    options: ClusterOptions,
+    cosine_squared: f64,
+    ranks: Vec<u16>,
+    /// Pieces and groups on the way from the leaves to the cell under way.
+    nodes: Vec<Node>,
+    groups: Vec<Group>,
+    /// The piece of every component at the level under way, as its number in `nodes`.
+    node_of: Vec<u32>,
+    joined: Vec<u32>,
+    merged: Vec<Node>,
+    merged_groups: Vec<Group>,
+    /// Refusals so far in the brick.
+    pub refusals: Refusals,
+}
+
+/// A cell under way: its level, Morton number at that level, and the leaf cells in it.
+struct Cell {
+    level: u32,
+    number: usize,
+    leaves: Range<usize>,
+}
+
+impl Clustering {
+    /// A maker of cuts.
+    pub fn new(options: ClusterOptions) -> Self {
+        Self {
+            options,
+            // The cut-off of the quadrics is tan² of half the crease angle.
+            cosine_squared: 1.0 / (1.0 + options.qef.cutoff()),
+            ranks: vec![NO_RANK; SIDE * SIDE * SIDE],
+            nodes: Vec::new(),
+            groups: Vec::new(),
+            node_of: Vec::new(),
+            joined: Vec::new(),
+            merged: Vec::new(),
+            merged_groups: Vec::new(),
+            refusals: Refusals::default(),
+        }
+    }
+
+    /// Clusters the vertices of `brick`, which are one for every component of its cells; no cell
+    /// of `brick.banned` becomes a cluster.
+    pub fn cut(&mut self, brick: &mut CellBrick, leaves: &Leaves) {
+        self.refusals = Refusals::default();
+        self.nodes.clear();
+        self.groups.clear();
+        self.node_of.clear();
+        self.node_of.resize(brick.positions.len(), 0);
+        for (rank, &cell) in brick.cells.iter().enumerate() {
+            self.ranks[cell_number(cell)] = rank as u16;
+        }
+        let positions = std::mem::take(&mut brick.positions);
+        let mut cut = Cut { brick, leaves, positions, placed: Vec::new() };
+        let all = 0..cut.brick.cells.len();
+        self.visit(&mut cut, &Cell { level: MAX_LEVEL, number: 0, leaves: all });
+        for &cell in &brick.cells {
+            self.ranks[cell_number(cell)] = NO_RANK;
+        }
+    }
+
+    /// Makes the cut within a cell; whether its parent may still be a cluster, and then its pieces
+    /// are the last of `nodes`.
+    fn visit(&mut self, cut: &mut Cut, cell: &Cell) -> bool {
+        if cell.level == 0 {
+            self.visit_leaf(cut, cell.leaves.start);
+            return true;
+        }
+        let before = (self.nodes.len(), self.groups.len());
+        let mark = cut.mark();
+        let mut is_alive = true;
+        let mut octants = [0_u8; 8];
+        let mut child_ends = [0_usize; 8];
+        let mut children = 0;
+        let mut start = cell.leaves.start;
+        while start < cell.leaves.end {
+            let shift = 3 * (cell.level - 1);
+            let number = cell_number(cut.brick.cells[start]) >> shift;
+            let end = cut.end_of(start, cell.leaves.end, number, shift);
+            let child = Cell { level: cell.level - 1, number, leaves: start..end };
+            is_alive &= self.visit(cut, &child);
+            octants[children] = (number & 7) as u8;
+            child_ends[children] = self.nodes.len();
+            children += 1;
+            start = end;
+        }
+        if is_alive {
+            self.merge(cut, cell, before, &octants[..children], &child_ends);
+            is_alive = self.judge(cut, cell, before.0, &mark);
+        }
+        if !is_alive {
+            self.nodes.truncate(before.0);
+            self.groups.truncate(before.1);
+        }
+        is_alive
+    }
+
+    /// The pieces of a leaf cell, which is in the cut until a larger cell takes its place.
+    fn visit_leaf(&mut self, cut: &mut Cut, rank: usize) {
+        let leaves = cut.leaves;
+        let components = components_of(cut.brick.cells[rank]);
+        let first = leaves.components[rank] as usize;
+        for (i, &edges) in components.edge_masks[..usize::from(components.count)].iter().enumerate()
+        {
+            let component = first + i;
+            let mut node = Node::leaf(edges);
+            node.first_group = self.groups.len() as u32;
+            let mut fits = true;
+            for hit in cut.hits_of(component) {
+                let point = DVec3::from(hit.point.map(f64::from));
+                node.points += point;
+                node.count += 1.0;
+                if hit.plane & JUDGES_ONLY == 0 && fits {
+                    let group = Group::of(hit, &leaves.planes);
+                    let from = node.first_group as usize;
+                    fits = add_group(&mut self.groups, from, &group, self.cosine_squared);
+                }
+            }
+            node.groups = self.groups.len() as u32 - node.first_group;
+            if !fits {
+                self.groups.truncate(node.first_group as usize);
+                node.groups = Node::TOO_MANY;
+            }
+            self.node_of[component] = self.nodes.len() as u32;
+            self.nodes.push(node);
+            cut.brick.positions.push(cut.positions[component]);
+        }
+    }
+
+    /// Joins the pieces of the children of a cell, which lie in `nodes` from `before` on.
+    fn merge(
+        &mut self,
+        cut: &Cut,
+        cell: &Cell,
+        (first_node, first_group): (usize, usize),
+        octants: &[u8],
+        child_ends: &[usize; 8],
+    ) {
+        let count = self.nodes.len() - first_node;
+        self.joined.clear();
+        self.joined.extend(0..count as u32);
+        if count > 1 {
+            self.join_across(cut, cell, first_node);
+        }
+        // Roots are the smallest of their sets, so pieces are numbered by their first child.
+        self.merged.clear();
+        self.merged_groups.clear();
+        let pieces = (0..count).filter(|i| self.joined[*i] as usize == *i).count();
+        self.merged.resize(pieces, Node::EMPTY);
+        self.number_and_add(first_node, octants, child_ends);
+        self.merge_groups(first_node, first_group);
+        let components = cut.components_in(&cell.leaves);
+        for node in &mut self.node_of[components] {
+            *node = first_node as u32 + self.joined[*node as usize - first_node];
+        }
+        self.nodes.truncate(first_node);
+        self.nodes.extend_from_slice(&self.merged);
+    }
+
+    /// Turns `joined` from roots into the numbers of new pieces, and adds children to them.
+    fn number_and_add(&mut self, first_node: usize, octants: &[u8], child_ends: &[usize; 8]) {
+        let mut next = 0;
+        let mut child = 0;
+        for i in 0..self.joined.len() {
+            while first_node + i >= child_ends[child] {
+                child += 1;
+            }
+            let root = self.joined[i] as usize;
+            // A root comes before all others of its set, so its own number is there already.
+            let number = if root == i {
+                next += 1;
+                next - 1
+            } else {
+                self.joined[root]
+            };
+            self.joined[i] = number;
+            let octant = usize::from(octants[child]);
+            self.merged[number as usize].add(&self.nodes[first_node + i], octant);
+        }
+        self.merged.iter_mut().for_each(Node::close);
+    }
+
+    /// Joins pieces that share an arc on the planes that halve the cell.
+    fn join_across(&mut self, cut: &Cut, cell: &Cell, first_node: usize) {
+        let half = 1 << (cell.level - 1);
+        let low_bits = 2 * half - 1;
+        for rank in cell.leaves.clone() {
+            let packed = cut.brick.cells[rank];
+            let at = place_of(cell_number(packed));
+            for axis in 0..3 {
+                if at[axis] & low_bits != half {
+                    continue;
+                }
+                let pairs = segments_on(packed, 2 * axis).pairs();
+                if pairs.is_empty() {
+                    continue;
+                }
+                let mut below = at;
+                below[axis] -= 1;
+                let other = usize::from(self.ranks[number_at(below)]);
+                for &[edge, _] in pairs {
+                    let here = cut.component(rank, usize::from(edge));
+                    let there = cut.component(other, across(edge, axis));
+                    let (a, b) = (self.node_of[here], self.node_of[there]);
+                    unite(&mut self.joined, a - first_node as u32, b - first_node as u32);
+                }
+            }
+        }
+        for i in 0..self.joined.len() as u32 {
+            self.joined[i as usize] = find(&mut self.joined, i);
+        }
+    }
+
+    /// The groups of the new pieces, in place of those of their children.
+    fn merge_groups(&mut self, first_node: usize, first_group: usize) {
+        for (number, node) in self.merged.iter_mut().enumerate() {
+            let from = self.merged_groups.len();
+            let mut fits = true;
+            for (i, _) in self.joined.iter().enumerate().filter(|(_, n)| **n as usize == number) {
+                let child = &self.nodes[first_node + i];
+                fits &= child.groups != Node::TOO_MANY;
+                if !fits {
+                    break;
+                }
+                let range = child.first_group as usize..(child.first_group + child.groups) as usize;
+                for group in &self.groups[range] {
+                    let groups = &mut self.merged_groups;
+                    fits = fits && add_group(groups, from, group, self.cosine_squared);
+                }
+            }
+            node.first_group = (first_group + from) as u32;
+            node.groups = (self.merged_groups.len() - from) as u32;
+            if !fits {
+                self.merged_groups.truncate(from);
+                node.groups = Node::TOO_MANY;
+            }
+        }
+        self.groups.truncate(first_group);
+        self.groups.extend_from_slice(&self.merged_groups);
+    }
+
+    /// Makes the cell a cluster if all its pieces allow it; whether a larger one may still be.
+    fn judge(&mut self, cut: &mut Cut, cell: &Cell, first_node: usize, mark: &Mark) -> bool {
+        let pieces = &self.nodes[first_node..];
+        if pieces.iter().any(|node| node.groups == Node::TOO_MANY) {
+            self.refusals.by_error += 1;
+            return false;
+        }
+        let is_simple = pieces.iter().all(Node::is_simple)
+            && pieces.len() <= usize::from(u8::MAX)
+            && !self.shares_ambiguous_face(cut, cell);
+        if !is_simple {
+            self.refusals.by_shape += 1;
+            return true;
+        }
+        let mut placed = std::mem::take(&mut cut.placed);
+        placed.clear();
+        let fits = (first_node..self.nodes.len()).all(|node| {
+            let vertex = self.place(cut, cell, node);
+            placed.extend(vertex);
+            vertex.is_some()
+        });
+        if fits && !cut.is_banned(cell) {
+            cut.collapse(cell, mark, &placed, &self.node_of, first_node);
+        }
+        cut.placed = placed;
+        self.refusals.by_error += u64::from(!fits);
+        fits
+    }
+
+    /// Whether a piece has both segments of an ambiguous face on the cell's boundary.
+    fn shares_ambiguous_face(&self, cut: &Cut, cell: &Cell) -> bool {
+        let last = (1_usize << cell.level) - 1;
+        cell.leaves.clone().any(|rank| {
+            let packed = cut.brick.cells[rank];
+            let mut faces = AMBIGUOUS_FACES[usize::from(cell_mask(packed))];
+            if faces == 0 {
+                return false;
+            }
+            let at = place_of(cell_number(packed));
+            while faces != 0 {
+                let face = faces.trailing_zeros() as usize;
+                faces &= faces - 1;
+                let bound = if face & 1 == 1 { last } else { 0 };
+                if at[face / 2] & last != bound {
+                    continue;
+                }
+                let [one, other] = [0, 1].map(|i| {
+                    let edge = segments_on(packed, face).pairs()[i][0];
+                    self.node_of[cut.component(rank, usize::from(edge))]
+                });
+                if one == other {
+                    return true;
+                }
+            }
+            false
+        })
+    }
+
+    /// The vertex of a piece on the lattice; `None` if it lies too far from a plane.
+    fn place(&self, cut: &Cut, cell: &Cell, number: usize) -> Option<[i32; 3]> {
+        let node = &self.nodes[number];
+        let ClusterOptions { cell_units, inset_units, .. } = self.options;
+        let size = (1 << cell.level) as f64;
+        let low = place_of(cell.number).map(|c| (c << cell.level) as f64);
+        let half = size * 0.5;
+        let centre = DVec3::from(low) + half;
+        let reach = half - inset_units as f64 / cell_units as f64;
+        let mut options = self.options.qef;
+        (options.lo, options.hi) = (DVec3::splat(-reach), DVec3::splat(reach));
+        let first = node.first_group as usize;
+        let groups = &self.groups[first..first + node.groups as usize];
+        let middle = node.points / node.count.max(1.0);
+        let planes = &cut.leaves.planes;
+        let solution = place(groups, planes, centre, middle, &options);
+        if solution.clamped {
+            return None;
+        }
+        let at = solution.position + centre;
+        let vertex: [i32; 3] = std::array::from_fn(|a| {
+            let low = low[a] as i64 * cell_units;
+            let units = (at[a] * cell_units as f64).round() as i64;
+            units.clamp(low + inset_units, low + size as i64 * cell_units - inset_units) as i32
+        });
+        let at = DVec3::from(vertex.map(f64::from)) / cell_units as f64;
+        let threshold = self.options.threshold_cells;
+        let mut components = cut.components_in(&cell.leaves);
+        components
+            .all(|component| {
+                self.node_of[component] as usize != number
+                    || largest_distance(cut.hits_of(component), planes, at) <= threshold
+            })
+            .then_some(vertex)
+    }
+}
+
+/// The number of an edge on the min face of `axis`, seen from the cell below.
+const fn across(edge: u8, axis: usize) -> usize {
+    // Of the two bits for the place of an edge across its direction, the one of `axis`.
+    let is_second = axis == if edge / 4 == 2 { 1 } else { 2 };
+    (edge | if is_second { 2 } else { 1 }) as usize
+}
+
+fn find(joined: &mut [u32], mut i: u32) -> u32 {
+    while joined[i as usize] != i {
+        joined[i as usize] = joined[joined[i as usize] as usize];
+        i = joined[i as usize];
+    }
+    i
+}
+
+fn unite(joined: &mut [u32], a: u32, b: u32) {
+    let (a, b) = (find(joined, a), find(joined, b));
+    joined[a.max(b) as usize] = a.min(b);
+}

@@ -1,0 +1,142 @@
+//! Face points that are vertices, brick by brick: the last thing before the surface is written.
+//!
+//! In:         bricks of cells whose flags and vertices are final.
+//! Out:        those bricks that changed since they were placed, with the vertices on the faces
+//!             that they own, which are those below their cells.
+//! Invariant:  a face point stands where its arc leaves its face, halfway between the two crossings
+//!             there; it depends on the arc alone, so both polygons that have it see the same.
+//! Units:      lattice units from the brick's min corner.
+//! Memory:     per worker what [`Neighbourhood`] holds, and 64 bytes a face point.
+//! Fails:      [`ContourError`].
+//! Source:     Ju and Udeshi 2006 (face vertices).
+
+use rkyv::rancor::BoxedError;
+
+use crate::contour::mdc::arcs::{Arc, Edge, edges_of};
+use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
+use crate::contour::mdc::layers::Layers;
+use crate::contour::mdc::neighbourhood::Neighbourhood;
+use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, flags_of};
+use crate::contour::{ContourError, ContourStats, SURFACE};
+use crate::monitor::{Gauge, Resident};
+use crate::octree::{CellBrick, Domain, FacePoint, encode};
+use crate::store::{BrickFile, BrickWriter, Resources, StoreError, ordered_by_weight};
+
+/// What a byte of a record takes while its face points are sought.
+const RECORD_FACTOR: u64 = 12;
+
+/// Adds the face points to the bricks of `layers`.
+///
+/// # Errors
+/// [`ContourError`].
+pub fn add(
+    layers: &Layers,
+    domain: &Domain,
+    stats: &mut ContourStats,
+    resources: &Resources,
+) -> Result<BrickFile, ContourError> {
+    let mut writer = BrickWriter::create(resources.scratch, SURFACE, resources.backing)?;
+    let mut numbers =
+        (0..layers.len()).filter(|number| layers.is_anew(*number) || may_have_points(layers, *number));
+    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
+    ordered_by_weight(
+        resources.pool,
+        resources.scales(|number: &usize| RECORD_FACTOR * layers.record_bytes(*number)),
+        || {
+            if resources.monitor.cancelled() {
+                return Err(ContourError::Store(StoreError::Cancelled));
+            }
+            Ok(numbers.next())
+        },
+        || Neighbourhood::new(*layers, domain),
+        |nb, number| {
+            let _brick = resident.hold(1);
+            let points = face_points(nb, number)?;
+            if points.is_empty() && !layers.is_anew(number) {
+                return Ok(None);
+            }
+            let mut brick = layers.read(number, |record| {
+                Ok(rkyv::deserialize::<CellBrick, BoxedError>(record).expect("plain vectors"))
+            })?;
+            brick.points = points;
+            let flagged = brick.flagged.len() as u64;
+            let points = brick.points.len() as u64;
+            let flags = flags_of(&brick);
+            Ok(Some((layers.key(number), flags, encode(&brick), flagged, points)))
+        },
+        |made| {
+            let Some((key, flags, bytes, flagged, points)) = made else { return Ok(()) };
+            stats.flagged_cells += flagged;
+            stats.face_points += points;
+            Ok(writer.append(key.0, flags, &bytes)?)
+        },
+    )?;
+    Ok(writer.finish(resources.cached_windows)?)
+}
+
+/// Whether the brick, or one below a side of it, has cells that make face points.
+fn may_have_points(layers: &Layers, number: usize) -> bool {
+    let key = layers.key(number);
+    let below = (0..3).filter_map(|axis| layers.find(key.lower(1 << axis)?));
+    std::iter::once(number)
+        .chain(below)
+        .any(|number| layers.flags(number) & (HAS_CLUSTERS | HAS_FLAGGED) != 0)
+}
+
+/// The face points that the brick owns, by ascending key.
+fn face_points(nb: &mut Neighbourhood, number: usize) -> Result<Vec<FacePoint>, ContourError> {
+    nb.move_to(number)?;
+    let mut ends = Vec::new();
+    for rank in 0..nb.own().cells.len() {
+        add_ends(nb, rank, &mut ends)?;
+    }
+    ends.sort_unstable_by_key(|(key, _, edge)| (*key, *edge));
+    let mut points = Vec::new();
+    for of_arc in ends.chunk_by(|a, b| a.0 == b.0) {
+        let [(key, arc, one), (_, _, other)] = of_arc else {
+            return Err(nb.contradiction("one arc between two cells"));
+        };
+        let crossings = [
+            nb.crossing(one.axis, one.lower)?.0,
+            nb.crossing(other.axis, other.lower)?.0,
+        ];
+        let position = arc.point(crossings, nb.cell_units());
+        points.push(FacePoint { key: *key, position });
+    }
+    Ok(points)
+}
+
+/// Adds where the arcs on the lower faces of a leaf cell end whose face points are vertices.
+fn add_ends(
+    nb: &mut Neighbourhood,
+    rank: usize,
+    ends: &mut Vec<(u64, Arc, Edge)>,
+) -> Result<(), ContourError> {
+    let own = nb.own();
+    let packed = own.cells[rank];
+    let number = cell_number(packed);
+    let cut = own.vertices[own.firsts[rank] as usize].cut;
+    let at = place_of(number).map(|c| c as i32);
+    let low = (1 << cut.level()) - 1;
+    for axis in 0..3 {
+        let pairs = segments_on(packed, 2 * axis).pairs();
+        // Within its own cluster there is no face.
+        if pairs.is_empty() || at[axis] & low != 0 {
+            continue;
+        }
+        let mut below = at;
+        below[axis] -= 1;
+        let (here, there) = (nb.cell(at)?, nb.cell(below)?);
+        for &pair in pairs {
+            let edges = edges_of(pair, at);
+            let upper = nb.vertex(here, pair[0]);
+            let edge = crate::contour::mdc::cell::edge_in_cell(edges[0].axis, edges[0].lower, below);
+            let arc = Arc { axis, lower: nb.vertex(there, edge), upper };
+            if arc.is_explicit(nb.cell_units()) {
+                let is_end = |edge: &Edge| arc.ends_at(edge, at);
+                ends.extend(edges.into_iter().filter(is_end).map(|edge| (arc.key(), arc, edge)));
+            }
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,242 @@
+//! A brick of cells, or its side that touches another brick, ready to be looked up in.
+//!
+//! Memory:     some 40 bytes a cell and 28 a component.
+
+use crate::contour::ContourError;
+use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of, place_of};
+use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
+
+/// A cell of the cut, packed: number of its first leaf cell (15 bits), level (3 bits at 15), whether
+/// it is flagged (bit 18), whether it has several vertices (bit 19).
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CutCell(u32);
+
+impl CutCell {
+    const FLAGGED: u32 = 1 << 18;
+    const MULTI: u32 = 1 << 19;
+
+    /// Packs.
+    #[inline]
+    pub fn new(first: usize, level: u32, is_flagged: bool, is_multi: bool) -> Self {
+        let flagged = if is_flagged { Self::FLAGGED } else { 0 };
+        Self(first as u32 | level << 15 | flagged | if is_multi { Self::MULTI } else { 0 })
+    }
+
+    /// The number of its first leaf cell.
+    #[inline]
+    pub fn first(self) -> usize {
+        (self.0 & 0x7fff) as usize
+    }
+
+    /// 0 for a leaf cell.
+    #[inline]
+    pub fn level(self) -> u32 {
+        self.0 >> 15 & 7
+    }
+
+    /// Whether all its face points are vertices.
+    #[inline]
+    pub fn is_flagged(self) -> bool {
+        self.0 & Self::FLAGGED != 0
+    }
+
+    /// Whether it has several vertices.
+    #[inline]
+    pub fn is_multi(self) -> bool {
+        self.0 & Self::MULTI != 0
+    }
+
+    /// Whether it is a leaf cell that is not flagged.
+    #[inline]
+    pub fn is_plain(self) -> bool {
+        self.0 & (7 << 15 | Self::FLAGGED) == 0
+    }
+}
+
+/// A vertex of a brick.
+#[derive(Clone, Copy, Debug)]
+pub struct Vertex {
+    /// Its number in the brick.
+    pub number: u32,
+    /// Units from the min corner of the brick that looks.
+    pub position: [i32; 3],
+    /// Its cell, in its own brick.
+    pub cut: CutCell,
+}
+
+/// A brick as seen from another, or from itself.
+pub struct Loaded {
+    /// Packed cells, ascending.
+    pub cells: Vec<u32>,
+    /// First component of each cell.
+    pub firsts: Vec<u32>,
+    /// The vertex of every component.
+    pub vertices: Vec<Vertex>,
+    /// First offset of each cell.
+    pub offset_firsts: Vec<u32>,
+    /// Offsets of the crossings on own edges.
+    pub offsets: Vec<u16>,
+    /// Keys and numbers of the vertices on faces.
+    pub points: Vec<(u64, u32)>,
+    /// Their positions, as those of vertices.
+    pub point_positions: Vec<[i32; 3]>,
+}
+
+/// Walks the cells of the cut along the leaf cells.
+struct CutWalk<'r> {
+    record: &'r ArchivedCellBrick,
+    cluster: usize,
+    member: usize,
+    flagged: usize,
+    /// First vertex of the cell of the cut under way.
+    vertex: u32,
+    /// End of the cluster under way, in leaf numbers, and how many vertices it has.
+    end: usize,
+    count: u32,
+    cut: CutCell,
+}
+
+impl<'r> CutWalk<'r> {
+    fn new(record: &'r ArchivedCellBrick) -> Self {
+        let cut = CutCell(0);
+        Self { record, cluster: 0, member: 0, flagged: 0, vertex: 0, end: 0, count: 0, cut }
+    }
+
+    fn is_flagged(&mut self, first: usize) -> bool {
+        let flagged = &self.record.flagged;
+        while flagged.get(self.flagged).is_some_and(|f| usize::from(f.to_native()) < first) {
+            self.flagged += 1;
+        }
+        flagged.get(self.flagged).is_some_and(|f| usize::from(f.to_native()) == first)
+    }
+
+    /// The cell of the cut that the leaf cell lies in, with its first vertex; the leaf's components
+    /// have the vertices that `member` tells.
+    #[inline]
+    fn step(&mut self, number: usize, components: u32) -> (CutCell, u32, bool) {
+        if number < self.end {
+            return (self.cut, self.vertex - self.count, true);
+        }
+        if let Some(cluster) = self.record.clusters.get(self.cluster) {
+            let cluster = cluster.to_native();
+            let (first, level) = ((cluster & 0x7fff) as usize, cluster >> 15 & 7);
+            if first <= number {
+                self.cluster += 1;
+                self.end = first + (1 << (3 * level));
+                self.count = cluster >> 18;
+                self.vertex += self.count;
+                let flagged = self.is_flagged(first);
+                self.cut = CutCell::new(first, level, flagged, self.count > 1);
+                return (self.cut, self.vertex - self.count, true);
+            }
+        }
+        let flagged = !self.record.flagged.is_empty() && self.is_flagged(number);
+        self.vertex += components;
+        (CutCell::new(number, 0, flagged, components > 1), self.vertex - components, false)
+    }
+
+    /// Which vertex of its cluster the next component has.
+    fn member(&mut self) -> Option<u32> {
+        if self.count == 1 {
+            return Some(0);
+        }
+        self.member += 1;
+        self.record.members.get(self.member - 1).map(|member| u32::from(*member))
+    }
+}
+
+impl Loaded {
+    /// Loads a brick that lies `steps` bricks away along each axis, -1, 0 or 1: of its cells those
+    /// that touch the brick it is seen from, and all of them when it is that brick.
+    ///
+    /// # Errors
+    /// [`ContourError::Contradiction`].
+    pub fn new(
+        record: &ArchivedCellBrick,
+        key: BrickKey,
+        steps: [i32; 3],
+        brick_units: i64,
+    ) -> Result<Self, ContourError> {
+        let shift = steps.map(|step| step * brick_units as i32);
+        let moved = |position: &rkyv::Archived<[i32; 3]>| -> [i32; 3] {
+            std::array::from_fn(|a| position[a].to_native() + shift[a])
+        };
+        let wrong = |expected| ContourError::Contradiction { brick: key.position(), expected };
+        let is_whole = steps == [0; 3];
+        let mut loaded = Self::with_room(if is_whole { record.cells.len() } else { 0 });
+        let mut walk = CutWalk::new(record);
+        let mut offset = 0;
+        for cell in record.cells.iter() {
+            let cell = cell.to_native();
+            let count = u32::from(components_of(cell).count);
+            let own_edges = usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
+            let number = cell_number(cell);
+            let (cut, first, is_cluster) = walk.step(number, count);
+            let is_wanted = is_whole || touches(number, steps);
+            if is_wanted {
+                loaded.cells.push(cell);
+                loaded.firsts.push(loaded.vertices.len() as u32);
+                loaded.offset_firsts.push(loaded.offsets.len() as u32);
+            }
+            for component in 0..count {
+                let number = if is_cluster {
+                    first + walk.member().ok_or_else(|| wrong("a member for every component"))?
+                } else {
+                    first + component
+                };
+                if is_wanted {
+                    let position = record.positions.get(number as usize);
+                    let position =
+                        moved(position.ok_or_else(|| wrong("a position for every vertex"))?);
+                    loaded.vertices.push(Vertex { number, position, cut });
+                }
+            }
+            if is_wanted {
+                let own = record.offsets.get(offset..offset + own_edges);
+                let own = own.ok_or_else(|| wrong("an offset for every own edge"))?;
+                loaded.offsets.extend(own.iter().map(|offset| offset.to_native()));
+            }
+            offset += own_edges;
+        }
+        let first = record.positions.len() as u32;
+        for (number, point) in (first..).zip(record.points.iter()) {
+            loaded.points.push((point.key.to_native(), number));
+            loaded.point_positions.push(moved(&point.position));
+        }
+        Ok(loaded)
+    }
+
+    fn with_room(cells: usize) -> Self {
+        Self {
+            cells: Vec::with_capacity(cells),
+            firsts: Vec::with_capacity(cells),
+            vertices: Vec::with_capacity(cells + cells / 8),
+            offset_firsts: Vec::with_capacity(cells),
+            offsets: Vec::with_capacity(cells + cells / 2),
+            points: Vec::new(),
+            point_positions: Vec::new(),
+        }
+    }
+
+    /// The vertex on a face, if there is one.
+    pub fn point(&self, key: u64) -> Option<(u32, [i32; 3])> {
+        let at = self.points.binary_search_by_key(&key, |point| point.0).ok()?;
+        Some((self.points[at].1, self.point_positions[at]))
+    }
+}
+
+/// The key of a vertex on the face across `axis` between the vertices `upper` of the brick that
+/// owns the face and `lower`, which may lie in the brick below.
+pub fn face_point_key(axis: usize, is_beyond: bool, upper: u32, lower: u32) -> u64 {
+    (axis as u64) << 62 | u64::from(is_beyond) << 61 | u64::from(upper) << 24 | u64::from(lower)
+}
+
+/// Whether a cell of a brick so many steps away touches the brick at no steps.
+fn touches(number: usize, steps: [i32; 3]) -> bool {
+    let at = place_of(number);
+    (0..3).all(|a| match steps[a] {
+        -1 => at[a] == SIDE - 1,
+        1 => at[a] == 0,
+        _ => true,
+    })
+}

@@ -1,0 +1,283 @@
+//! A brick and the bricks around it: the vertex of any component, the crossing of any edge.
+//!
+//! Units:      places in cells, positions in lattice units, both from the own brick's min corner;
+//!             a place may lie one cell outside.
+//! Memory:     [`Loaded`] for the own brick and for the sides of those around that were asked for.
+//! Fails:      [`ContourError::Contradiction`] where sound bricks have a cell and these do not.
+
+use crate::contour::ContourError;
+use crate::contour::mdc::cell::{
+    cell_mask, cell_number, components_of, edge_in_cell, number_at,
+};
+use crate::contour::mdc::layers::Layers;
+use crate::contour::mdc::loaded::{CutCell, Loaded, Vertex};
+use crate::contour::mdc::table::is_marked;
+use crate::octree::{BrickKey, Domain, SIDE};
+
+/// The own brick among the 27.
+const OWN: usize = 13;
+/// No cell of the brick has this rank: the list has at most 32768.
+const NO_RANK: u16 = u16::MAX;
+/// Crossings lie at multiples of this many units, and as far from the ends of their edges: so the
+/// middles of middles of two of them are on the lattice.
+pub const CROSSING_UNITS: i32 = 4;
+
+/// A leaf cell that was found: the brick among the 27, and its rank there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Found {
+    slot: usize,
+    rank: usize,
+}
+
+/// A vertex with the brick that it was found in.
+#[derive(Clone, Copy, Debug)]
+pub struct Patch {
+    /// The vertex.
+    pub vertex: Vertex,
+    /// The brick among the 27.
+    pub slot: usize,
+}
+
+impl Patch {
+    /// A name for the vertex, distinct in this neighbourhood.
+    #[inline]
+    pub fn id(&self) -> u64 {
+        (self.slot as u64) << 24 | u64::from(self.vertex.number)
+    }
+
+    /// The low corner of its cell of the cut, and how many leaf cells a side that has.
+    #[inline]
+    pub fn cut_box(&self) -> CutBox {
+        CutBox::new(self.slot, self.vertex.cut)
+    }
+}
+
+/// A cell of the cut as a box.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct CutBox {
+    /// Its low corner, in cells.
+    pub low: [i32; 3],
+    /// Its side, in cells.
+    pub side: i32,
+}
+
+impl CutBox {
+    fn new(slot: usize, cut: CutCell) -> Self {
+        let place = crate::contour::mdc::cell::place_of(cut.first());
+        let steps = steps_of(slot);
+        let low = std::array::from_fn(|a| place[a] as i32 + steps[a] * SIDE as i32);
+        Self { low, side: 1 << cut.level() }
+    }
+
+    /// Whether a leaf cell lies in it.
+    #[inline]
+    pub fn holds(&self, cell: [i32; 3]) -> bool {
+        (0..3).all(|a| (self.low[a]..self.low[a] + self.side).contains(&cell[a]))
+    }
+}
+
+/// How many bricks away slot `slot` lies along each axis.
+#[inline]
+pub const fn steps_of(slot: usize) -> [i32; 3] {
+    [slot as i32 % 3 - 1, slot as i32 / 3 % 3 - 1, slot as i32 / 9 - 1]
+}
+
+/// See the module.
+pub struct Neighbourhood<'f> {
+    layers: Layers<'f>,
+    domain: Domain,
+    key: BrickKey,
+    /// Rank of each cell of the own brick.
+    ranks: Vec<u16>,
+    bricks: [Option<Loaded>; 27],
+    /// The numbers of those bricks.
+    numbers: [usize; 27],
+}
+
+impl<'f> Neighbourhood<'f> {
+    /// A neighbourhood that has not moved in yet.
+    pub fn new(layers: Layers<'f>, domain: &Domain) -> Self {
+        Self {
+            layers,
+            domain: *domain,
+            key: BrickKey(0),
+            ranks: vec![NO_RANK; SIDE * SIDE * SIDE],
+            bricks: [const { None }; 27],
+            numbers: [usize::MAX; 27],
+        }
+    }
+
+    /// Moves to brick `number`.
+    ///
+    /// # Errors
+    /// [`ContourError`].
+    pub fn move_to(&mut self, number: usize) -> Result<(), ContourError> {
+        self.key = self.layers.key(number);
+        self.bricks = [const { None }; 27];
+        self.numbers = [usize::MAX; 27];
+        let (key, units) = (self.key, self.domain.brick_units());
+        let own = self.layers.read(number, |record| Loaded::new(record, key, [0; 3], units))?;
+        self.ranks.fill(NO_RANK);
+        for (rank, &cell) in own.cells.iter().enumerate() {
+            self.ranks[cell_number(cell)] = rank as u16;
+        }
+        self.bricks[OWN] = Some(own);
+        self.numbers[OWN] = number;
+        Ok(())
+    }
+
+    /// The own brick's key.
+    pub fn key(&self) -> BrickKey {
+        self.key
+    }
+
+    /// Lattice units of a cell.
+    #[inline]
+    pub fn cell_units(&self) -> i32 {
+        self.domain.cell_units as i32
+    }
+
+    /// The own brick.
+    #[inline]
+    pub fn own(&self) -> &Loaded {
+        self.bricks[OWN].as_ref().expect("moved in")
+    }
+
+    /// The number of the brick in a slot that was looked into.
+    pub fn number_of(&self, slot: usize) -> usize {
+        self.numbers[slot]
+    }
+
+    /// What to say when bricks are not sound.
+    pub fn contradiction(&self, expected: &'static str) -> ContourError {
+        ContourError::Contradiction { brick: self.key.position(), expected }
+    }
+
+    /// The brick in a slot; `None` where no surface is.
+    fn brick(&mut self, slot: usize) -> Result<Option<&Loaded>, ContourError> {
+        if self.bricks[slot].is_none() {
+            let steps = steps_of(slot);
+            let position = self.key.position();
+            let moved: [i64; 3] =
+                std::array::from_fn(|a| i64::from(position[a]) + i64::from(steps[a]));
+            if moved.iter().any(|c| *c < 0) {
+                return Ok(None);
+            }
+            let key = BrickKey::new(moved.map(|c| c as u32));
+            let Some(number) = self.layers.find(key) else { return Ok(None) };
+            let units = self.domain.brick_units();
+            let loaded =
+                self.layers.read(number, |record| Loaded::new(record, key, steps, units))?;
+            self.bricks[slot] = Some(loaded);
+            self.numbers[slot] = number;
+        }
+        Ok(self.bricks[slot].as_ref())
+    }
+
+    /// The brick in a slot that sound bricks have.
+    #[inline]
+    pub fn sound_brick(&mut self, slot: usize) -> Result<&Loaded, ContourError> {
+        if self.bricks[slot].is_none() && self.brick(slot)?.is_none() {
+            return Err(self.contradiction("a brick beyond a crossed side"));
+        }
+        Ok(self.bricks[slot].as_ref().expect("just loaded"))
+    }
+
+    /// Looks for a leaf cell.
+    #[inline]
+    pub fn find(&mut self, at: [i32; 3]) -> Result<Option<Found>, ContourError> {
+        let side = SIDE as i32;
+        let steps = at.map(|c| 1 + i32::from(c >= side) - i32::from(c < 0));
+        let slot = (steps[0] + 3 * steps[1] + 9 * steps[2]) as usize;
+        let number = number_at(at.map(|c| (c & (side - 1)) as usize));
+        if slot == OWN {
+            let rank = self.ranks[number];
+            return Ok((rank != NO_RANK).then_some(Found { slot, rank: usize::from(rank) }));
+        }
+        let Some(brick) = self.brick(slot)? else { return Ok(None) };
+        let rank = brick.cells.binary_search_by_key(&number, |&cell| cell_number(cell));
+        Ok(rank.ok().map(|rank| Found { slot, rank }))
+    }
+
+    /// A leaf cell that sound bricks have.
+    #[inline]
+    pub fn cell(&mut self, at: [i32; 3]) -> Result<Found, ContourError> {
+        let found = self.find(at)?;
+        found.ok_or_else(|| self.contradiction("a cell with a vertex around every crossed edge"))
+    }
+
+    #[inline]
+    fn loaded(&self, found: Found) -> &Loaded {
+        self.bricks[found.slot].as_ref().expect("found in it")
+    }
+
+    /// The packed cell.
+    #[inline]
+    pub fn packed(&self, found: Found) -> u32 {
+        self.loaded(found).cells[found.rank]
+    }
+
+    /// The vertex of the component that crosses `edge`, a number in the cell.
+    #[inline]
+    pub fn vertex(&self, found: Found, edge: u8) -> Patch {
+        let brick = self.loaded(found);
+        let component = components_of(brick.cells[found.rank]).component_of_edge[usize::from(edge)];
+        debug_assert!(component != crate::contour::mdc::table::NO_COMPONENT);
+        let at = brick.firsts[found.rank] + u32::from(component);
+        Patch { vertex: brick.vertices[at as usize], slot: found.slot }
+    }
+
+    /// The vertex of the component of the cell at `at` that crosses the edge along `axis` from
+    /// `lower`.
+    #[inline]
+    pub fn vertex_at(
+        &mut self,
+        at: [i32; 3],
+        axis: usize,
+        lower: [i32; 3],
+    ) -> Result<Patch, ContourError> {
+        let found = self.cell(at)?;
+        Ok(self.vertex(found, edge_in_cell(axis, lower, at)))
+    }
+
+    /// Whether the edge along `axis` from `lower` is crossed.
+    pub fn is_crossed(&mut self, axis: usize, lower: [i32; 3]) -> Result<bool, ContourError> {
+        let Some(found) = self.find(lower)? else { return Ok(false) };
+        let edge = edge_in_cell(axis, lower, lower);
+        Ok(is_marked(cell_mask(self.packed(found)), edge))
+    }
+
+    /// The crossing of the edge along `axis` from `lower`, and whether its lower end is inside.
+    pub fn crossing(
+        &mut self,
+        axis: usize,
+        lower: [i32; 3],
+    ) -> Result<([i32; 3], bool), ContourError> {
+        let found = self.cell(lower)?;
+        let mask = cell_mask(self.packed(found));
+        let before = (0..axis).filter(|a| (mask ^ mask >> (1 << a)) & 1 == 1).count();
+        let brick = self.loaded(found);
+        let offset = brick.offsets.get(brick.offset_firsts[found.rank] as usize + before);
+        let offset = *offset.ok_or_else(|| self.contradiction("an offset for every own edge"))?;
+        Ok((self.crossing_at(axis, lower, offset), mask & 1 == 1))
+    }
+
+    /// The crossing at `offset` of 65536 on the edge along `axis` from `lower`.
+    #[inline]
+    pub fn crossing_at(&self, axis: usize, lower: [i32; 3], offset: u16) -> [i32; 3] {
+        let cell = self.cell_units();
+        let mut crossing = lower.map(|c| c * cell);
+        let steps = i64::from(cell / CROSSING_UNITS);
+        let step = ((i64::from(offset) * steps + (1 << 15)) >> 16).clamp(1, steps - 1);
+        crossing[axis] += step as i32 * CROSSING_UNITS;
+        crossing
+    }
+
+    /// A place in model units.
+    #[inline]
+    pub fn to_model(&self, position: [i32; 3]) -> [f64; 3] {
+        let (brick, side) = (self.key.position(), self.domain.brick_units());
+        let lattice = std::array::from_fn(|a| i64::from(brick[a]) * side + i64::from(position[a]));
+        self.domain.to_model(lattice)
+    }
+}

@@ -1,0 +1,81 @@
+//! The record of a brick in `cells.bricks`: its cells with their vertices.
+//!
+//! Units: positions in lattice units from the brick's min corner.
+
+use rkyv::rancor::BoxedError;
+use rkyv::{Archive, Deserialize, Serialize};
+
+use crate::octree::brick::{ArchiveSize, BrickError, ROOT_BYTES, out_of_range};
+
+/// Highest level of a cluster: the whole brick.
+pub const MAX_LEVEL: u32 = 5;
+
+/// A vertex on a face between two cells of the cut, where the segment that joins their vertices
+/// does not pass.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Archive, Serialize, Deserialize)]
+pub struct FacePoint {
+    /// The axis across the face (2 bits at 62), whether the lower cell lies in another brick (1 bit
+    /// at 61), the vertex of the upper cell (24 bits at 24) and of the lower one (24 bits at 0), by
+    /// their numbers in their bricks.
+    pub key: u64,
+    /// Where it is.
+    pub position: [i32; 3],
+}
+
+/// What contouring leaves of a brick: its cells with their vertices.
+///
+/// The cut is the set of cells that have vertices of their own: clusters, and the leaf cells that
+/// no cluster covers. Vertices are numbered along it.
+#[derive(Clone, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
+pub struct CellBrick {
+    /// Cell number in Morton order (15 bits), corner mask (8 bits at 15), flags of a flipped face
+    /// (1 bit at 23) and of one vertex for all components (1 bit at 24); ascending.
+    pub cells: Vec<u32>,
+    /// Clusters: number of their first cell (15 bits), level 1 to 5 (3 bits at 15), number of
+    /// vertices (8 bits at 18); ascending, none within another.
+    pub clusters: Vec<u32>,
+    /// Of each cluster with several vertices: the one that each component of its cells belongs to.
+    pub members: Vec<u8>,
+    /// Numbers of the first cells of those cells of the cut whose face points are all vertices.
+    pub flagged: Vec<u16>,
+    /// Clusters that must not be, as in `clusters` without the number of vertices; ascending.
+    pub banned: Vec<u32>,
+    /// Vertex positions, cell after cell of the cut, component after component.
+    pub positions: Vec<[i32; 3]>,
+    /// Offsets of the crossings on the cells' own edges (those that leave their min corner), in
+    /// 1/65536 of the edge, cell after cell, axis after axis.
+    pub offsets: Vec<u16>,
+    /// Vertices on the faces that the brick owns, by ascending key; numbered after those of cells.
+    pub points: Vec<FacePoint>,
+}
+
+impl ArchiveSize for CellBrick {
+    fn archive_bytes(&self) -> usize {
+        let words = self.cells.len() + self.clusters.len() + self.banned.len();
+        let halves = self.offsets.len() + self.flagged.len();
+        let places = 12 * self.positions.len() + 24 * self.points.len();
+        4 * words + 2 * halves + self.members.len() + places + 2 * ROOT_BYTES
+    }
+}
+
+/// Validates a [`CellBrick`].
+///
+/// # Errors
+/// [`BrickError`] when the bytes are none.
+pub fn decode_cells(bytes: &[u8]) -> Result<&ArchivedCellBrick, BrickError> {
+    let kind = "cell";
+    let brick = rkyv::access::<ArchivedCellBrick, BoxedError>(bytes)
+        .map_err(|source| BrickError::Invalid { kind, source })?;
+    if let Some(cell) = brick.cells.iter().find(|cell| cell.to_native() >> 25 != 0) {
+        return Err(out_of_range(kind, "cell", cell.to_native().into(), 1 << 25));
+    }
+    let is_cluster = |cluster: u32| {
+        let (first, level) = (cluster & 0x7fff, cluster >> 15 & 7);
+        (1..=MAX_LEVEL).contains(&level) && first.is_multiple_of(1 << (3 * level))
+    };
+    let clusters = brick.clusters.iter().chain(brick.banned.iter());
+    match clusters.map(|cluster| cluster.to_native()).find(|cluster| !is_cluster(*cluster)) {
+        Some(cluster) => Err(out_of_range(kind, "cluster", cluster.into(), 1 << 26)),
+        None => Ok(brick),
+    }
+}
