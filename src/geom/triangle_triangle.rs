@@ -74,13 +74,14 @@ fn from(first: usize, corners: &[[i64; 3]; 3]) -> [[i64; 3]; 3] {
 /// Whether the boxes of the triangles have a point in common.
 #[inline]
 fn may_touch(a: &[[i64; 3]; 3], b: &[[i64; 3]; 3]) -> bool {
-    (0..3).all(|axis| {
+    // No branches, since nothing foretells them.
+    (0..3).fold(true, |all, axis| {
         let span = |t: &[[i64; 3]; 3]| {
             let [p, q, r] = [t[0][axis], t[1][axis], t[2][axis]];
             (p.min(q).min(r), p.max(q).max(r))
         };
         let ((a_lo, a_hi), (b_lo, b_hi)) = (span(a), span(b));
-        a_lo <= b_hi && b_lo <= a_hi
+        all & (a_lo <= b_hi) & (b_lo <= a_hi)
     })
 }
 
@@ -104,7 +105,7 @@ fn meets(a: [[i64; 3]; 3], b: [[i64; 3]; 3]) -> bool {
     if !a_above {
         (t, u) = (u, t);
     }
-    orientation(p, q, s, t) <= 0 && orientation(p, r, s, u) >= 0
+    (orientation(p, q, s, t) <= 0) & (orientation(p, r, s, u) >= 0)
 }
 
 /// How a triangle lies to the plane of another that it is not clear of.
@@ -195,13 +196,15 @@ fn seen_along(normal: [i64; 3]) -> usize {
     }
 }
 
-/// Corners in the plane of the two axes that remain, turned left.
+/// Points seen along an axis: the coordinates that remain.
 #[inline]
 fn flatten(corners: [[i64; 3]; 3], axis: usize) -> [[i64; 2]; 3] {
-    const OTHERS: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
-    let [x, y] = OTHERS[axis];
-    let [p, q, r] = corners.map(|corner| [corner[x], corner[y]]);
-    if turn(p, q, r) < 0 { [p, r, q] } else { [p, q, r] }
+    // One copy for each axis, so that none picks coordinates by a number known only then.
+    match axis {
+        0 => corners.map(|[_, y, z]| [y, z]),
+        1 => corners.map(|[x, _, z]| [z, x]),
+        _ => corners.map(|[x, y, _]| [x, y]),
+    }
 }
 
 /// Twice the area of the triangle of three points: positive when they turn left.
@@ -211,13 +214,14 @@ fn turn(p: [i64; 2], q: [i64; 2], r: [i64; 2]) -> i64 {
 }
 
 /// Whether two triangles in one plane have a point in common: no edge has the other triangle
-/// strictly outside.
+/// strictly outside. No branches, since nothing foretells them.
 fn meets_in_plane(a: [[i64; 3]; 3], b: [[i64; 3]; 3], normal: [i64; 3]) -> bool {
     let axis = seen_along(normal);
     let (a, b) = (flatten(a, axis), flatten(b, axis));
     let parts = |one: &[[i64; 2]; 3], other: &[[i64; 2]; 3]| {
-        let outside = |p, q| other.iter().all(|&corner| turn(p, q, corner) < 0);
-        outside(one[0], one[1]) || outside(one[1], one[2]) || outside(one[2], one[0])
+        let left = turn(one[0], one[1], one[2]).signum();
+        let outside = |p, q| other.iter().fold(true, |all, &c| all & (turn(p, q, c) * left < 0));
+        outside(one[0], one[1]) | outside(one[1], one[2]) | outside(one[2], one[0])
     };
     !parts(&a, &b) && !parts(&b, &a)
 }
@@ -226,10 +230,11 @@ fn meets_in_plane(a: [[i64; 3]; 3], b: [[i64; 3]; 3], normal: [i64; 3]) -> bool 
 /// angle of the other, or along it.
 fn meets_beyond_vertex_in_plane(a: [[i64; 3]; 3], b: [[i64; 3]; 3], normal: [i64; 3]) -> bool {
     let axis = seen_along(normal);
-    let (a, b) = (flatten(a, axis), flatten(b, axis));
-    let enters = |one: &[[i64; 2]; 3], other: &[[i64; 2]; 3]| {
-        let [vertex, right, left] = *one;
-        other[1..].iter().any(|&c| turn(vertex, right, c) >= 0 && turn(vertex, c, left) >= 0)
-    };
-    enters(&a, &b) || enters(&b, &a)
+    let ([v, p, q], [_, s, t]) = (flatten(a, axis), flatten(b, axis));
+    let (a_left, b_left) = (turn(v, p, q).signum(), turn(v, s, t).signum());
+    let [ps, pt, qs, qt] = [turn(v, p, s), turn(v, p, t), turn(v, q, s), turn(v, q, t)];
+    let s_in_a = (ps * a_left >= 0) & (qs * a_left <= 0);
+    let in_b = |to_s: i64, to_t: i64| (to_s * b_left <= 0) & (to_t * b_left >= 0);
+    // If t were in a and s not, p or q would be in b.
+    s_in_a | in_b(ps, pt) | in_b(qs, qt)
 }
