@@ -60,6 +60,7 @@ class Brickmend:
         outcome = json.loads(run.stdout)
         seconds = {name: stage["cpu_seconds"] for name, stage in outcome["stages"].items()}
         grid = {"cell": outcome["cell_size"], "leaf_cells": outcome["scan"]["leaf_cells"]}
+        grid["budget_bytes"] = outcome["memory"]["budget_bytes"]
         bounds = outcome["input"]["bounds"]
         grid["extent"] = max(hi - lo for lo, hi in zip(bounds["lo"], bounds["hi"]))
         grid["input_triangles"] = outcome["input"]["triangles"]
@@ -205,6 +206,8 @@ class Bench:
         failure = run.failure()
         if not failure and tool.kind != "start" and not output.exists():
             failure = "no output"
+        # The page tells names, not places.
+        failure = failure and failure.replace(str(self.arguments.mesh), self.arguments.mesh.name)
         record = {
             "depth": depth, "tool": tool.name, "failure": failure, "cpu_seconds": run.cpu_seconds,
             "wall_seconds": run.wall_seconds, "peak_bytes": run.peak_bytes,

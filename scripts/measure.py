@@ -104,7 +104,7 @@ def judge(command, output, reference=None, timeout_seconds=None):
     The judge is any command that takes `check MESH --json [--input REFERENCE]` and prints an
     object with `as_written` or `welded` (edge and vertex counts), `self_intersections.pairs`,
     `orientation.ok`, `verdict.valid` and, with a reference, `input` (distances as shares of its
-    `diagonal`).
+    `diagonal`). `distance` adds --no-intersections.
     """
     arguments = ["check", str(output), "--json"]
     if reference:
@@ -131,6 +131,14 @@ def judge(command, output, reference=None, timeout_seconds=None):
         words["in_to_out"] = against["ref_to_out"]["max"]
         words["visible_in_to_out"] = against["visible"]["max"]
     return words
+
+
+def distance(command, output, reference, timeout_seconds=None):
+    """Largest distance between two meshes in model units by the same judge; None if it failed."""
+    arguments = ["check", str(output), "--json", "--no-intersections", "--input", str(reference)]
+    ended = run([*shlex.split(command), *arguments], timeout_seconds)
+    against = json.loads(ended.stdout)["input"] if ended.code == 0 else None
+    return against and against["hausdorff"] * against["diagonal"]
 
 
 def table(head, rows):

@@ -141,8 +141,9 @@ def plot(bench, path):
     matplotlib.use("Agg")
     matplotlib.rcParams["svg.hashsalt"] = "peers"
     import matplotlib.pyplot as plt
+    from matplotlib import ticker
 
-    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.2), layout="constrained")
+    figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
     shown = [tool for tool in bench.tools if tool.kind != "start"]
     for tool, colour in zip(shown, COLOURS * len(shown)):
         less = bench.without_proof if tool.kind == "own" else bench.without_start
@@ -156,10 +157,16 @@ def plot(bench, path):
         draw(right, bench, tool.name, peak, style)
     for axes, title in ((left, "CPU seconds, user and system"), (right, "Peak resident memory, MiB")):
         axes.set(yscale="log", xticks=bench.depths(), xlabel="octree depth", title=title)
+        axes.yaxis.set_major_locator(ticker.LogLocator(subs=(1, 2, 5)))
         axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(ticker.NullFormatter())
         axes.grid(alpha=0.3)
         axes.spines[["top", "right"]].set_visible(False)
-    left.legend(frameon=False, fontsize=8)
+    budget = bench.grid(bench.depths()[0]).get("budget_bytes")
+    if budget:
+        style = {"color": COLOURS[0], "linestyle": ":", "label": "brickmend's --max-memory"}
+        right.axhline(budget / 2**20, **style)
+    figure.legend(loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     figure.savefig(path, metadata={"Date": None} if path.suffix == ".svg" else None)
     plt.close(figure)
     return True

@@ -53,6 +53,7 @@ class Sweep:
 
     def __init__(self, arguments, extra):
         self.arguments, self.extra = arguments, extra
+        self.thresholds = arguments.decimate or [PLAIN]
         self.key, self.start = identity(arguments, extra), measure.machine()
         self.path = arguments.out / "quality.json"
         self.rows = {}
@@ -84,12 +85,16 @@ class Sweep:
         run, outcome = measure.repair(
             self.arguments.brickmend, model, output, [*options, *self.extra], self.arguments.timeout
         )
+        failure = run.failure() and run.failure().replace(str(model), model.name)
         self.rows[name][threshold] = {
-            "code": run.code, "failure": run.failure(), "wall_seconds": run.wall_seconds,
+            "code": run.code, "failure": failure, "wall_seconds": run.wall_seconds,
             "cpu_seconds": run.cpu_seconds, "outcome": outcome,
         }
+        if not self.arguments.keep:
+            # What a failed repair leaves for going on.
+            shutil.rmtree(f"{output}.brickmend", ignore_errors=True)
         self.save()
-        print(f"{name}, {threshold}: {run.failure() or f'{run.wall_seconds:.2f} s'}", flush=True)
+        print(f"{name}, {threshold}: {failure or f'{run.wall_seconds:.2f} s'}", flush=True)
 
     def judge(self, task):
         """The judge's word on one output; None where there is nothing to judge or it is known."""
@@ -97,11 +102,15 @@ class Sweep:
         row = self.rows[name][threshold]
         if row["code"] != 0 or is_judged(row):
             return task, None
-        return task, measure.judge(self.arguments.judge, self.output(name, threshold), model)
+        output, first = (self.output(name, t) for t in (threshold, self.thresholds[0]))
+        words = measure.judge(self.arguments.judge, output, model)
+        if output != first and first.exists() and "valid" in words:
+            words["to_first"] = measure.distance(self.arguments.judge, output, first)
+        return task, words
 
-    def run(self, models, thresholds):
+    def run(self, models):
         """All repairs, then all judging."""
-        tasks = [(name, model, threshold) for name, model in models for threshold in thresholds]
+        tasks = [(name, model, threshold) for name, model in models for threshold in self.thresholds]
         for task in tasks:
             self.repair(*task)
         if self.arguments.judge:
@@ -117,19 +126,20 @@ class Sweep:
 
 
 def distances(row):
-    """Hausdorff in % of the diagonal; out to in and visible in to out in cells. None if not judged."""
+    """Hausdorff in % of the diagonal; out to in, visible in to out, to the first threshold's, in cells."""
     if not is_judged(row):
-        return [None] * 3
-    words = row["judge"]
-    cells = words["diagonal"] / row["outcome"]["cell_size"]
-    return [100 * words["hausdorff"], words["out_to_in"] * cells, words["visible_in_to_out"] * cells]
+        return [None] * 4
+    words, cell = row["judge"], row["outcome"]["cell_size"]
+    cells, to_first = words["diagonal"] / cell, words.get("to_first")
+    told_cells = [words["out_to_in"] * cells, words["visible_in_to_out"] * cells]
+    return [100 * words["hausdorff"], *told_cells, None if to_first is None else to_first / cell]
 
 
 def line_of(name, threshold, row, fields):
     """A line of the long table."""
     outcome = row["outcome"]
     if outcome is None:
-        return [name, threshold, row["failure"], *[""] * (9 + len(fields))]
+        return [name, threshold, row["failure"], *[""] * (10 + len(fields))]
     proof, words = outcome["output"]["proof"], row.get("judge", {})
     peak = (outcome["memory"]["peak_bytes"] or 0) / 2**20
     return [
@@ -151,7 +161,7 @@ def sums(rows, thresholds):
     """One line per threshold over all models that were repaired."""
     head = [
         "threshold", "models", "triangles", "vertices", "CPU s", "largest peak MiB", "intersecting pairs",
-        "models with pairs", "valid", "largest out → in, cells",
+        "models with pairs", "valid", "largest out → in, cells", "largest to first threshold, cells",
     ]
     lines = []
     for threshold in thresholds:
@@ -165,7 +175,8 @@ def sums(rows, thresholds):
         if judged:
             valid = sum(r["judge"]["valid"] for r in judged)
             line += [measure.short(sum(pairs)), sum(p > 0 for p in pairs), f"{valid} of {len(judged)}"]
-            line += [measure.short(max(distances(r)[1] for r in judged))]
+            largest = lambda k: max((distances(r)[k] for r in judged if distances(r)[k] is not None), default=None)
+            line += [measure.short(largest(1)), measure.short(largest(3))]
         lines.append(line + [""] * (len(head) - len(line)))
     return measure.table(head, lines)
 
@@ -196,7 +207,8 @@ def page(sweep, rows, thresholds):
     fields = [(name, path) for name, _, path in (word.partition("=") for word in arguments.field)]
     head = [
         "model", "threshold", "triangles", "vertices", "CPU s", "wall s", "peak MiB", "intersecting pairs",
-        "Hausdorff, % of diagonal", "out → in, cells", "visible in → out, cells", "valid",
+        "Hausdorff, % of diagonal", "out → in, cells", "visible in → out, cells",
+        "to first threshold, cells", "valid",
         *[name for name, _ in fields],
     ]
     long = [line_of(n, t, rows[n][t], fields) for n in rows for t in thresholds if t in rows[n]]
@@ -209,8 +221,8 @@ def page(sweep, rows, thresholds):
         f"Written by `scripts/quality.py`. brickmend {version}, `{words}`; {start['date']}; {start['machine']};"
         f" {start['system']}; load before the first run: {start['load']:.2f}.\n",
         "Distances are the judge's, from samples: out → in is the largest from the result to the input, the"
-        " other way only what can be seen of the input counts. Hausdorff is over all, hidden parts too. Valid:"
-        " closed, manifold, outward, no degenerate triangle, no intersecting pair.\n",
+        " other way only what can be seen of the input counts. Hausdorff is over all, hidden parts too. To first"
+        " threshold: the larger of both ways between this result and that of the first threshold. Valid: closed, manifold, outward, no degenerate triangle, no intersecting pair.\n",
         "## Sums\n", sums(rows, thresholds),
         "## Chosen models\n",
         over_thresholds(rows, chosen, thresholds, "Vertices", lambda r: r["outcome"]["output"]["proof"]["vertices"]),
@@ -241,7 +253,7 @@ def parse():
     parser.add_argument("--only", default="", help="models whose path contains this")
     parser.add_argument("--format", default="ply", help="of the outputs [ply]")
     parser.add_argument("--timeout", type=float, default=3600, metavar="SECONDS", help="of one repair [3600]")
-    parser.add_argument("--keep", action="store_true", help="keep the outputs")
+    parser.add_argument("--keep", action="store_true", help="keep the outputs, and what failed repairs leave")
     words = sys.argv[1:]
     split = words.index("--") if "--" in words else len(words)
     return parser, parser.parse_args(words[:split]), words[split + 1 :]
@@ -255,12 +267,11 @@ def main():
     root = arguments.models if arguments.models.is_dir() else arguments.models.parent
     models = [(str(path.relative_to(root)), path) for path in paths]
     arguments.out.mkdir(parents=True, exist_ok=True)
-    thresholds = arguments.decimate or [PLAIN]
     sweep = Sweep(arguments, extra)
-    sweep.run(models, thresholds)
+    sweep.run(models)
     rows = {name: sweep.rows[name] for name, _ in models}
-    (arguments.out / "quality.md").write_text(page(sweep, rows, thresholds))
-    done = [rows[name][threshold] for name in rows for threshold in thresholds]
+    (arguments.out / "quality.md").write_text(page(sweep, rows, sweep.thresholds))
+    done = [rows[name][threshold] for name in rows for threshold in sweep.thresholds]
     failed = [r for r in done if r["code"] not in (0, UNREADABLE) or r.get("judge", {}).get("valid") is False]
     sys.exit(1 if failed or any("failure" in r.get("judge", {}) for r in done) else 0)
 

@@ -2,7 +2,7 @@
 """Draws meshes of the same part side by side, shaded, with edges, close-ups below.
 
     scripts/side_by_side.py SHEET.png [CAPTION=]MESH... [--view 30,25] [--up z]
-        [--box LO:HI]... [--cut] [--no-whole] [--width 640] [--columns N] [--no-edges]
+        [--box LO:HI]... [--cut] [--no-whole] [--width 640] [--columns N] [--no-edges] [--both-sides]
 
 All pictures have the same camera and frame: parallel projection, the viewer at 30 degrees to the
 right of the front (-y) and 25 above it. Faces seen from behind are red. Edges are those of the
@@ -120,7 +120,7 @@ def edge_side(corners, k, x, y):
     return (b[..., 0] - a[..., 0]) * (y - a[..., 1]) - (b[..., 1] - a[..., 1]) * (x - a[..., 0])
 
 
-def shade(corners, inner, camera, edges):
+def shade(corners, inner, camera, edges, back):
     """Colours of all samples of a picture."""
     width, height = camera.width * OVERSAMPLING, camera.height * OVERSAMPLING
     numbers = visible(corners, width, height)
@@ -137,7 +137,7 @@ def shade(corners, inner, camera, edges):
     light = np.full(len(seen), AMBIENT)
     for *direction, strength in LAMPS:
         light += strength * np.maximum(0, normals @ (np.array(direction) / np.linalg.norm(direction)))
-    picture[at] = (np.where(behind[:, None], BACK, FRONT) * light[:, None])[of_seen]
+    picture[at] = (np.where(behind[:, None], back, FRONT) * light[:, None])[of_seen]
     if edges:
         ink = np.zeros(len(at))
         x, y = at % width + 0.5, at // width + 0.5
@@ -175,7 +175,7 @@ def draw(mesh, camera, arguments, boxes=(), cut=False):
     if cut:
         keep = seen[:, :, 2].min(axis=1) <= camera.near * camera.scale * OVERSAMPLING
         seen, inner = seen[keep], inner[keep]
-    picture = shade(seen, inner, camera, arguments.edges)
+    picture = shade(seen, inner, camera, arguments.edges, FRONT if arguments.both_sides else BACK)
     for box in boxes:
         outline(picture, camera, box)
     blocks = picture.reshape(camera.height, OVERSAMPLING, camera.width, OVERSAMPLING, 3).mean(axis=(1, 3))
@@ -210,6 +210,7 @@ def parse():
     parser.add_argument("--box", action="append", default=[], metavar="LO:HI", help="a close-up; may be repeated")
     parser.add_argument("--cut", action="store_true", help="close-ups without what lies before the box")
     parser.add_argument("--no-whole", dest="whole", action="store_false", help="close-ups only")
+    parser.add_argument("--both-sides", action="store_true", help="backs are drawn like fronts")
     parser.add_argument("--no-edges", dest="edges", action="store_false")
     parser.add_argument("--width", type=int, default=640, help="of a picture, in pixels [640]")
     parser.add_argument("--columns", type=int, default=4, help="pictures in a row, at most [4]")
