@@ -157,6 +157,11 @@ def told(value):
     return measure.short(value) if isinstance(value, (int, float)) and not isinstance(value, bool) else value or ""
 
 
+def proof_of(row):
+    """What the proof counted in a result."""
+    return row["outcome"]["output"]["proof"]
+
+
 def sums(rows, thresholds):
     """One line per threshold over all models that were repaired."""
     head = [
@@ -167,7 +172,7 @@ def sums(rows, thresholds):
     for threshold in thresholds:
         good = [r[threshold] for r in rows.values() if r.get(threshold, {}).get("outcome")]
         judged = [r for r in good if is_judged(r)]
-        proofs = [r["outcome"]["output"]["proof"] for r in good]
+        proofs = [proof_of(r) for r in good]
         pairs = [r["judge"]["intersecting_pairs"] for r in judged]
         peaks = [(r["outcome"]["memory"]["peak_bytes"] or 0) / 2**20 for r in good]
         line = [threshold, len(good), *[measure.short(sum(p[n] for p in proofs)) for n in ("triangles", "vertices")]]
@@ -221,12 +226,13 @@ def page(sweep, rows, thresholds):
         f"Written by `scripts/quality.py`. brickmend {version}, `{words}`; {start['date']}; {start['machine']};"
         f" {start['system']}; load before the first run: {start['load']:.2f}.\n",
         "Distances are the judge's, from samples: out → in is the largest from the result to the input, the"
-        " other way only what can be seen of the input counts. Hausdorff is over all, hidden parts too. To first"
-        " threshold: the larger of both ways between this result and that of the first threshold. Valid: closed, manifold, outward, no degenerate triangle, no intersecting pair.\n",
+        " other way only what can be seen of the input counts. Hausdorff is over all, hidden parts too. To"
+        " first threshold: the larger of both ways between this result and that of the first threshold. Valid:"
+        " closed, manifold, outward, no degenerate triangle, no intersecting pair.\n",
         "## Sums\n", sums(rows, thresholds),
         "## Chosen models\n",
-        over_thresholds(rows, chosen, thresholds, "Vertices", lambda r: r["outcome"]["output"]["proof"]["vertices"]),
-        over_thresholds(rows, chosen, thresholds, "Triangles", lambda r: r["outcome"]["output"]["proof"]["triangles"]),
+        over_thresholds(rows, chosen, thresholds, "Vertices", lambda r: proof_of(r)["vertices"]),
+        over_thresholds(rows, chosen, thresholds, "Triangles", lambda r: proof_of(r)["triangles"]),
         over_thresholds(rows, chosen, thresholds, "Wall seconds", lambda r: r["wall_seconds"]),
         over_thresholds(rows, chosen, thresholds, "CPU seconds", lambda r: r["cpu_seconds"]),
         "## All models\n", measure.table(head, long),

@@ -17,7 +17,10 @@ import argparse
 import math
 import os
 
-import numpy as np
+try:
+    import numpy as np
+except ImportError:
+    raise SystemExit("side_by_side.py needs numpy") from None
 
 import contact_sheet
 import measure
