@@ -99,7 +99,7 @@ def page(bench):
     cells = ", ".join(
         f"{measure.short(bench.grid(d).get('leaf_cells'))} at depth {d}" for d in bench.depths()
     )
-    rounds = f"median of {arguments.rounds} rounds, in turns"
+    rounds = f"median of {arguments.rounds} rounds, in turns" if arguments.rounds > 1 else "one round"
     if arguments.once_from:
         rounds += f"; one round from depth {arguments.once_from} on"
     lines = [
