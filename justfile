@@ -43,3 +43,13 @@ fuzz TARGET SECONDS="60":
 estimates *ARGS:
     cargo build --release
     scripts/check_estimate.py {{ARGS}}
+
+# Measures brickmend beside its peers; needs an interpreter with bpy, and vdb_tool.
+bench-peers MESH *ARGS:
+    cargo build --release
+    scripts/bench_peers.py {{MESH}} {{ARGS}}
+
+# Repairs every model at every clustering threshold and writes tables.
+quality MODELS OUT *ARGS:
+    cargo build --release
+    scripts/quality.py {{MODELS}} {{OUT}} {{ARGS}}

@@ -28,7 +28,7 @@ GLYPHS = {
     "O": "3e4141413e", "P": "7f09090906", "Q": "3e4151215e", "R": "7f09192946",
     "S": "4649494931", "T": "01017f0101", "U": "3f4040403f", "V": "1f2040201f",
     "W": "3f4038403f", "X": "6314081463", "Y": "0708700807", "Z": "6151494543",
-    "?": "0201510906",
+    "?": "0201510906", ",": "0050300000",
 }
 LETTER = 6  # columns of a letter with its gap
 SCALE = 2
@@ -143,6 +143,23 @@ def write_png(path, width, rows):
     os.replace(path + ".partial", path)
 
 
+def join(cells, columns):
+    """Lays pictures (width and rows) out in columns; the width and the rows of the sheet."""
+    columns = min(columns, len(cells))
+    cell_width = max(width for width, _ in cells) + MARGIN
+    sheet = []
+    for first in range(0, len(cells), columns):
+        line = cells[first : first + columns]
+        for y in range(max(len(rows) for _, rows in line) + MARGIN):
+            row = bytearray([PAPER]) * (3 * cell_width * columns)
+            for place, (width, rows) in enumerate(line):
+                if y < len(rows):
+                    start = 3 * cell_width * place
+                    row[start : start + 3 * width] = rows[y]
+            sheet.append(row)
+    return cell_width * columns, sheet
+
+
 def main():
     """Reads, shrinks, labels and joins."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -162,19 +179,7 @@ def main():
         label = label or os.path.splitext(os.path.basename(path))[0]
         cells.append((width, label_rows(label, width) + rows))
 
-    columns = min(arguments.columns, len(cells))
-    cell_width = max(width for width, _ in cells) + MARGIN
-    sheet = []
-    for first in range(0, len(cells), columns):
-        line = cells[first : first + columns]
-        for y in range(max(len(rows) for _, rows in line) + MARGIN):
-            row = bytearray([PAPER]) * (3 * cell_width * columns)
-            for place, (width, rows) in enumerate(line):
-                if y < len(rows):
-                    start = 3 * cell_width * place
-                    row[start : start + 3 * width] = rows[y]
-            sheet.append(row)
-    write_png(arguments.sheet, cell_width * columns, sheet)
+    write_png(arguments.sheet, *join(cells, arguments.columns))
 
 
 if __name__ == "__main__":

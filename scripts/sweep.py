@@ -9,34 +9,22 @@ beside the output as NAME.judge.json.
 """
 
 import argparse
-import json
 import pathlib
 import shlex
 import subprocess
 import sys
-import time
 
-ENDINGS = {".obj", ".stl", ".ply", ".off", ".glb", ".gltf", ".3mf"}
-
-
-def repair(binary, model, output, extra):
-    """One model: exit code, seconds, outcome or the error message."""
-    start = time.monotonic()
-    command = [binary, "repair", str(model), "-o", str(output), "--json", *extra]
-    run = subprocess.run(command, capture_output=True, text=True, check=False)
-    seconds = time.monotonic() - start
-    outcome = json.loads(run.stdout) if run.returncode == 0 else None
-    return run.returncode, seconds, outcome, run.stderr.strip()
+import measure
 
 
-def row(name, code, seconds, outcome, message):
+def row(name, run, outcome):
     """A line of the table."""
     if outcome is None:
-        return f"| {name} | {code} | {seconds:.2f} | | | | | | | {message} |"
+        return f"| {name} | {run.code} | {run.wall_seconds:.2f} | | | | | | | {run.stderr.strip()} |"
     proof, soup = outcome["output"]["proof"], outcome["input"]
     peak = (outcome["memory"]["peak_bytes"] or 0) / 2**20
     return (
-        f"| {name} | {code} | {seconds:.2f} | {peak:.0f} | {outcome['grid']['depth']} "
+        f"| {name} | {run.code} | {run.wall_seconds:.2f} | {peak:.0f} | {outcome['grid']['depth']} "
         f"| {proof['triangles']} | {soup['area']:.5g} → {proof['area']:.5g} "
         f"| {soup['signed_volume']:.5g} → {proof['volume']:.5g} "
         f"| {outcome['output']['area_ratio']:.3f} | {'; '.join(outcome['reasons'])} |"
@@ -50,7 +38,7 @@ def main():
     parser.add_argument("--brickmend", default="target/release/brickmend")
     parser.add_argument("--judge", help="command to run on every output, {out} is its path")
     parser.add_argument("--format", default="ply")
-    parser.add_argument("--only", default="", help="names that contain this")
+    parser.add_argument("--only", default="", help="models whose path contains this")
     words = sys.argv[1:]
     split = words.index("--") if "--" in words else len(words)
     arguments, extra = parser.parse_args(words[:split]), words[split + 1 :]
@@ -58,14 +46,12 @@ def main():
     print("| model | exit | s | MiB | depth | triangles | area in → out | volume in → out | ratio | look |")
     print("|---|---|---|---|---|---|---|---|---|---|")
     failures = 0
-    for model in sorted(p for p in arguments.models.rglob("*") if p.suffix.lower() in ENDINGS):
-        if arguments.only not in model.name:
-            continue
+    for model in measure.models_below(arguments.models, arguments.only):
         output = arguments.out / f"{model.stem}.{arguments.format}"
         output.unlink(missing_ok=True)
-        code, seconds, outcome, message = repair(arguments.brickmend, model, output, extra)
-        failures += code not in (0, 65)
-        print(row(model.name, code, seconds, outcome, message), flush=True)
+        run, outcome = measure.repair(arguments.brickmend, model, output, extra)
+        failures += run.code not in (0, 65)
+        print(row(model.name, run, outcome), flush=True)
         if arguments.judge and output.exists():
             judge = [part.format(out=output) for part in shlex.split(arguments.judge)]
             verdict = subprocess.run(judge, capture_output=True, text=True, check=False).stdout
