@@ -28,6 +28,10 @@ pub struct ResultArguments {
     /// Angle in degrees below which a crease is noise.
     #[arg(long, value_name = "DEGREES", default_value = "12", value_parser = parse_angle)]
     crease: f64,
+    /// How the surface is drawn. What is guaranteed rests on mdc; the others are for comparison.
+    /// What another cannot promise is proved and told, and ends the run with 4 where it fails.
+    #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
+    method: MethodName,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
     #[arg(long)]
     strict: bool,
@@ -56,6 +60,23 @@ enum FillRuleName {
     Evenodd,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// Manifold dual contouring: creases and corners stay sharp.
+    Mdc,
+    /// Marching cubes: sound as well, but cuts creases and corners off, and leaves slivers.
+    Mc,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Mdc => Self::Mdc,
+            MethodName::Mc => Self::Mc,
+        }
+    }
+}
+
 impl ResultArguments {
     pub fn settings(&self) -> Settings {
         let depth = match (self.depth, self.tolerance) {
@@ -70,7 +91,7 @@ impl ResultArguments {
             FillRuleName::Evenodd => FillRule::Evenodd,
         };
         let (crease_deg, strict) = (self.crease, self.strict);
-        Settings { depth, fill_rule, crease_deg, method: Method::Mdc, strict }
+        Settings { depth, fill_rule, crease_deg, method: self.method.into(), strict }
     }
 }
 

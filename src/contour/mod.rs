@@ -3,17 +3,23 @@
 //! In:         the brick file of sign generation.
 //! Out:        vertices and triangles into a [`crate::mesh::MeshSink`], numbered in Morton order of
 //!             the bricks.
-//! Invariant:  closed and 2-manifold by construction; every vertex strictly inside its cell, on
-//!             the lattice that the output file holds exactly; no triangle is degenerate.
+//! Invariant:  closed and 2-manifold by construction; every vertex strictly inside its cell (its
+//!             edge for [`mc`]), on the lattice that the output file holds exactly; no triangle is
+//!             degenerate.
 //! Units:      lattice units within a brick, model units at the sink.
-//! Memory:     per worker one brick and the border of its seven lower neighbours; 4 bytes a brick.
+//! Memory:     per worker one brick and the border of its seven lower (upper for [`mc`])
+//!             neighbours; 4 bytes a brick.
 //! Fails:      [`ContourError`]: the scratch disk, the sink, or bricks that contradict each other.
-//! Source:     that of the method; see [`mdc`].
+//! Source:     that of the method; see [`mdc`] and [`mc`].
 //!
-//! [`mdc`] is manifold dual contouring, the method that the guarantees rest on. Other methods get
-//! a folder beside it and an arm in [`place_vertices`] and [`write_surface`].
+//! [`mdc`] is manifold dual contouring, the method that the guarantees rest on. [`mc`] is marching
+//! cubes, for comparison. Another method gets a folder beside them, a [`Method`] with what it
+//! cannot promise, and an arm wherever the compiler asks for one: here, in `maker` and in `write`.
 
+pub mod mc;
 pub mod mdc;
+
+mod maker;
 
 #[cfg(test)]
 mod noise_tests;
@@ -36,6 +42,23 @@ pub enum Method {
     /// Manifold dual contouring.
     #[default]
     Mdc,
+    /// Marching cubes.
+    Mc,
+}
+
+impl Method {
+    /// What it cannot promise of its surface; `None` for the method that the guarantees rest on.
+    /// A proof that fails ends the run of that one only.
+    #[must_use]
+    pub const fn caveat(self) -> Option<&'static str> {
+        match self {
+            Self::Mdc => None,
+            Self::Mc => Some(
+                "marching cubes cuts creases and corners off, by up to a cell, and leaves slivers \
+                 where the surface passes near a corner of the grid",
+            ),
+        }
+    }
 }
 
 /// Settings of contouring that change the result.
@@ -84,11 +107,11 @@ pub struct ContourStats {
     pub multi_cells: u64,
     /// Ambiguous faces that were flipped to keep the surface manifold, counted once per cell.
     pub flipped_faces: u64,
-    /// Vertices in cells.
+    /// Vertices in cells; on edges by marching cubes.
     pub cell_vertices: u64,
     /// Vertices that were pulled back into their cell.
     pub clamped_vertices: u64,
-    /// Polygons: one per crossed edge.
+    /// Polygons: one per crossed edge; one per boundary cycle of a cell by marching cubes.
     pub polygons: u64,
     /// Polygons drawn as a fan around their crossing.
     pub fans: u64,
@@ -123,5 +146,6 @@ pub fn place_vertices(
 ) -> Result<(BrickFile, ContourStats), ContourError> {
     match options.method {
         Method::Mdc => mdc::place_vertices(signs, domain, options, resources),
+        Method::Mc => mc::place_vertices(signs, domain, resources),
     }
 }

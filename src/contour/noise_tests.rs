@@ -26,9 +26,9 @@ const NOISE: std::ops::Range<usize> = 16..48;
 
 /// A sink that keeps everything.
 #[derive(Default)]
-struct Kept {
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+pub struct Kept {
+    pub vertices: Vec<[f64; 3]>,
+    pub triangles: Vec<[u32; 3]>,
 }
 
 impl MeshSink for Kept {
@@ -63,10 +63,10 @@ impl MeshSink for Kept {
 }
 
 /// Signs of all corners of the grid, and hits on its edges that look the same from every brick.
-struct Field {
-    seed: u64,
-    inside_share: f64,
-    patch_share: f64,
+pub struct Field {
+    pub seed: u64,
+    pub inside_share: f64,
+    pub patch_share: f64,
 }
 
 impl Field {
@@ -134,13 +134,18 @@ enum Hit {
 }
 
 /// What came of a field.
-struct Contoured {
-    kept: Kept,
-    proof: Proof,
-    stats: ContourStats,
+pub struct Contoured {
+    pub kept: Kept,
+    pub proof: Proof,
+    pub stats: ContourStats,
 }
 
 fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
+    contour_by(Method::Mdc, field, backing, threads)
+}
+
+/// Contours a field by a method and proves what comes of it.
+pub fn contour_by(method: Method, field: &Field, backing: Backing, threads: usize) -> Contoured {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -161,10 +166,12 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
         writer.append(key, 0, &encode(&brick)).expect("room");
     }
     let signs = writer.finish(2).expect("room");
-    let options = ContourOptions { method: Method::Mdc, crease_deg: 12.0 };
+    let options = ContourOptions { method, crease_deg: 12.0 };
     let (cells, placed) =
         place_vertices(&signs, &domain, &options, &resources).expect("sound bricks");
-    assert_vertices_lie_in_their_cells(&cells, &domain);
+    if method == Method::Mdc {
+        assert_vertices_lie_in_their_cells(&cells, &domain);
+    }
     let mut kept = Kept::default();
     let stats = write_surface(&cells, &domain, &options, (&placed, None), &mut kept, &resources)
         .expect("sound bricks");

@@ -3,21 +3,17 @@
 //! In:         cells of all bricks, and a sink.
 //! Out:        the sink has taken everything.
 //! Invariant:  what the sink takes does not depend on where an earlier run was stopped.
-//! Memory:     4 bytes a brick, and what [`Polygons`] holds.
+//! Memory:     4 bytes a brick, and what the [`Maker`] holds.
 
 use serde::{Deserialize, Serialize};
 
-use crate::contour::mdc::{BrickTriangles, FAN_POINT, Polygons};
-use crate::contour::{ContourError, ContourOptions, ContourStats, Method};
+use crate::contour::maker::Maker;
+use crate::contour::mdc::{BrickTriangles, FAN_POINT};
+use crate::contour::{ContourError, ContourOptions, ContourStats, Method, mc};
 use crate::mesh::{MeshSink, SinkState};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, decode_cells};
 use crate::store::{BrickFile, Progress, Resources, StoreError, ordered_by_weight};
-
-/// What a byte of a record of cells takes as triangles.
-const FACTOR: u64 = 4;
-/// The same where triangles come with their corners.
-const FACTOR_WITH_CORNERS: u64 = 18;
 
 /// What can go wrong while the surface is written.
 #[derive(Debug, thiserror::Error)]
@@ -73,7 +69,6 @@ pub fn write_surface<S: MeshSink + ?Sized>(
 where
     S::Error: Send,
 {
-    let Method::Mdc = options.method;
     let bases = number_vertices(cells)?;
     let vertices = u64::from(*bases.last().unwrap_or(&0));
     let (items, stats) = match start {
@@ -81,7 +76,8 @@ where
         None => (0, ContourStats { vertices, ..*placed }),
     };
     let saved_bytes = sink.bytes_so_far();
-    let mut writing = Writing { cells, domain, sink, resources, items, stats, saved_bytes };
+    let method = options.method;
+    let mut writing = Writing { method, cells, domain, sink, resources, items, stats, saved_bytes };
     resources.monitor.advance(items);
     writing.vertices()?;
     writing.triangles(&bases)?;
@@ -106,6 +102,7 @@ fn number_vertices(cells: &BrickFile) -> Result<Vec<u32>, StoreError> {
 
 /// A surface on its way into the sink.
 struct Writing<'w, S: ?Sized> {
+    method: Method,
     cells: &'w BrickFile,
     domain: &'w Domain,
     sink: &'w mut S,
@@ -127,7 +124,10 @@ where
                 self.save()?;
                 return Err(StoreError::Cancelled.into());
             }
-            self.read_positions(number, &mut positions)?;
+            match self.method {
+                Method::Mdc => self.read_positions(number, &mut positions)?,
+                Method::Mc => mc::read_positions(self.cells, number, self.domain, &mut positions)?,
+            }
             self.resources.monitor.gauge(Gauge::ResidentVertices, positions.len() as u64);
             self.sink.vertices(&positions).map_err(WriteError::Sink)?;
             self.item_done()?;
@@ -164,7 +164,8 @@ where
         let with_corners = self.sink.needs_corners();
         let mut numbers = self.items as usize - cells.len()..cells.len();
         let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-        let factor = if with_corners { FACTOR_WITH_CORNERS } else { FACTOR };
+        let (method, factors) = (self.method, self.method.factors());
+        let factor = if with_corners { factors.with_corners } else { factors.plain };
         let written = ordered_by_weight(
             resources.pool,
             resources.scales(|number: &usize| factor * cells.record_bytes(*number)),
@@ -174,10 +175,10 @@ where
                 }
                 Ok(numbers.next())
             },
-            || Polygons::new(cells, bases, domain, with_corners),
-            |polygons, number| {
+            || Maker::new(method, cells, bases, domain, with_corners),
+            |maker, number| {
                 let _brick = resident.hold(1);
-                Ok(polygons.triangles(number)?)
+                Ok(maker.triangles(number)?)
             },
             |brick| self.take(brick),
         );
