@@ -28,8 +28,8 @@ pub struct ResultArguments {
     /// Angle in degrees below which a crease is noise.
     #[arg(long, value_name = "DEGREES", default_value = "12", value_parser = parse_angle)]
     crease: f64,
-    /// How the surface is drawn. What is guaranteed rests on mdc; the others are for comparison.
-    /// What another cannot promise is proved and told, and ends the run with 4 where it fails.
+    /// How the surface is drawn. The guarantees rest on mdc; the others are for comparison. Where
+    /// the proof of another one's file fails, the file is kept and the run ends with 4.
     #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
     method: MethodName,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.

@@ -9,10 +9,12 @@ use crate::contour::{ContourError, Method};
 use crate::octree::Domain;
 use crate::store::BrickFile;
 
-/// What a byte of a record takes as triangles: without and with their corners.
+/// What a byte of a record takes as triangles, besides the byte.
 #[derive(Clone, Copy)]
 pub struct Factors {
+    /// Where the sink takes numbers of vertices.
     pub plain: u64,
+    /// Where it takes corners as well.
     pub with_corners: u64,
 }
 
@@ -28,7 +30,9 @@ impl Method {
 
 /// Makes the triangles of one brick after another, by one of the methods.
 pub enum Maker<'m> {
+    /// Manifold dual contouring.
     Mdc(Polygons<'m>),
+    /// Marching cubes.
     Mc(Triangles<'m>),
 }
 

@@ -1,8 +1,8 @@
 //! The records of bricks: what lies in a brick file, as rkyv archives.
 //!
 //! Three kinds, one per stage that writes them: [`HitBrick`] (scan), [`SignBrick`] (sign),
-//! [`CellBrick`] (contour). All are validated before they are read; the store has checked their
-//! hash before that.
+//! [`CellBrick`] (contour; that of marching cubes is in `edge_brick`). All are validated before
+//! they are read; the store has checked their hash before that.
 //!
 //! Units: positions and plane offsets in lattice units from the brick's min corner.
 

@@ -7,9 +7,10 @@
 //! twice, what lies between is outside. So cells meet in the sides of their cycles and nowhere
 //! else. Within a cell the sides of a cycle leave a convex part of every face outside, so this disk
 //! is also the wall of the hull of all that lies outside of the cycle, and a cycle that lies there
-//! cannot reach it; two that do not lie outside of each other are two opposite corners cut off.
+//! cannot reach it. Two cycles that do not lie outside of each other cut off two opposite corners,
+//! each alone outside, in two triangles far apart.
 //!
-//! Units: lattice units from the cell's min corner, below 2^24; all of it exact.
+//! Units: lattice units from the cell's min corner, at most 2^24; all of it exact.
 
 /// Calls `emit` with the numbers of three points for each triangle, in the direction of the cycle.
 pub fn cut(points: &[[i64; 3]], emit: &mut impl FnMut([usize; 3])) {
