@@ -106,6 +106,7 @@ fn what_the_command_line_cannot_mean_ends_with_2() {
         &["--max-memory", "1MiB"],
         &["--max-memory", "lots"],
         &["--crease", "200"],
+        &["--method", "guess"],
         &["--unheard-of"],
     ] {
         let (code, _, err) = repair(&cube, &output, extra);
@@ -276,6 +277,37 @@ fn the_help_names_every_exit_code() {
     let text = String::from_utf8(run.stdout).expect("text");
     for code in ["0 ", "1 ", "2 ", "4 ", "5 ", "6 ", "65 ", "130 "] {
         assert!(text.contains(&format!("\n  {code}")), "exit code {code}is not in the help");
+    }
+}
+
+#[test]
+fn a_method_is_chosen_by_name_and_tells_what_it_cannot_promise() {
+    let folder = folder();
+    let output = folder.path().join("out.ply");
+    let json = |extra: &[&str]| -> serde_json::Value {
+        let extra = [&["--depth", "5", "--json"], extra].concat();
+        let (code, out, err) = repair(&model(CUBE), &output, &extra);
+        assert_eq!((code, err.as_str()), (0, ""), "{extra:?}");
+        serde_json::from_str(&out).expect("stdout is JSON")
+    };
+    let default = json(&[]);
+    assert_eq!(default["settings"]["method"], "mdc");
+    assert!(default["output"]["caveat"].is_null());
+    let dual = std::fs::read(&output).expect("the output is there");
+    assert_eq!(json(&["--method", "mdc"])["settings"], default["settings"]);
+    let cubes = json(&["--method", "mc"]);
+    assert_eq!(cubes["settings"]["method"], "mc");
+    assert_eq!(cubes["verdict"], "pass", "{}", cubes["reasons"]);
+    let caveat = cubes["output"]["caveat"].as_str().expect("a caveat").to_owned();
+    assert!(caveat.contains("creases and corners"), "{caveat}");
+    assert_ne!(std::fs::read(&output).expect("the output is there"), dual);
+    let (code, _, err) = repair(&model(CUBE), &output, &["--depth", "5", "--method", "mc"]);
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains(&format!("note: {caveat}")), "{err}");
+    let run = brickmend().args(["repair", "--help"]).output().expect("the program starts");
+    let help = String::from_utf8(run.stdout).expect("text");
+    for words in ["--method", "- mdc:", "- mc:", "cuts creases and corners off"] {
+        assert!(help.contains(words), "{words} is not in the help");
     }
 }
 

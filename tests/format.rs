@@ -6,9 +6,9 @@ use std::path::Path;
 use brickmend::geom::morton;
 use brickmend::ingest::{AttributeRecord, BinEntry};
 use brickmend::octree::{
-    AXIS_EDGES, BrickKey, CellBrick, Crossing, DropRecord, FlipRecord, HitBrick, HitEdge, LINES,
-    MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle, SourcePlane, TRANSPARENT, decode_cells,
-    decode_hits, decode_signs, edge_index, encode,
+    AXIS_EDGES, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick, FlipRecord, HitBrick,
+    HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle, SourcePlane, TRANSPARENT,
+    decode_cells, decode_edges, decode_hits, decode_signs, edge_index, encode,
 };
 use brickmend::scan::HAS_ODD_FACES;
 use brickmend::store::{
@@ -312,4 +312,18 @@ fn sign_and_cell_bricks_are_as_documented() {
     assert_eq!(size_of_val(&cells.offsets[0]), 2);
     let beyond = CellBrick { cells: vec![1 << 25], ..CellBrick::default() };
     assert!(decode_cells(&encode(&beyond)).is_err(), "bits 25..31 are zero");
+}
+
+#[test]
+fn edge_bricks_are_as_documented() {
+    says("EdgeBrick", "bits  0..14  cell number");
+    says("EdgeBrick", "bits 15..22  corner mask");
+    says("EdgeBrick", "u32 per crossing on the three edges that leave the min corner");
+    // The last cell of a brick, its min corner alone inside: crossed along all axes.
+    let brick = EdgeBrick { cells: vec![0x7fff | 1 << 15], places: vec![1, 2, 3] };
+    let bytes = encode(&brick);
+    let edges = decode_edges(&bytes).expect("what was written validates");
+    assert_eq!((size_of_val(&edges.cells[0]), size_of_val(&edges.places[0])), (4, 4));
+    let beyond = EdgeBrick { cells: vec![1 << 23], ..EdgeBrick::default() };
+    assert!(decode_edges(&encode(&beyond)).is_err(), "bits 23..31 are zero");
 }

@@ -4,6 +4,7 @@ mod support;
 
 use std::path::Path;
 
+use brickmend::contour::Method;
 use brickmend::mesh::shapes::{Random, sphere};
 use brickmend::monitor::{Counter, Void};
 use brickmend::repair::{Limits, Settings};
@@ -28,13 +29,16 @@ struct Filmed {
 }
 
 fn film(depth: u32, stride: u64) -> Filmed {
+    film_with(at_depth(depth), stride)
+}
+
+fn film_with(settings: Settings, stride: u64) -> Filmed {
     let mut random = Random::new(29);
     let mut soup = sphere([0.1, 0.2, 0.3], 1.0, 20);
     Breakage::Drop.apply(&mut soup, 0.1, &mut random);
     Breakage::Duplicate.apply(&mut soup, 0.1, &mut random);
     let workshop = Workshop::new();
     let input = workshop.write(&soup, Encoding::Obj);
-    let settings = at_depth(depth);
     let limits = Limits { checkpoint_bytes: CHECKPOINT_BYTES, ..Limits::default() };
     let place = Place::new();
     let photographer = Photographer::new(&place, stride);
@@ -85,6 +89,24 @@ fn a_kill_between_checkpoints_goes_on_from_the_last_one() {
     for (_, image) in between {
         let (_, bytes) = image.resume(&filmed.input, &filmed.settings, &filmed.limits);
         assert!(bytes == filmed.expected, "other bytes");
+    }
+}
+
+#[test]
+fn marching_cubes_go_on_from_any_checkpoint() {
+    let filmed = film_with(Settings { method: Method::Mc, ..at_depth(7) }, u64::MAX);
+    for step in ["place", "write"] {
+        let within = filmed.images.iter().filter(|(m, _)| m.step == step && m.items > 0);
+        assert!(within.count() > 2, "{step}");
+    }
+    let images =
+        filmed.images.iter().filter(|(m, _)| ["sign", "place", "write"].contains(&&*m.step));
+    for (moment, image) in images {
+        let limits = Limits { threads: 1 + moment.items as usize % 3, ..filmed.limits.clone() };
+        let (outcome, bytes) = image.resume(&filmed.input, &filmed.settings, &limits);
+        assert!(bytes == filmed.expected, "{moment:?}: other bytes");
+        assert_eq!(outcome.resume.resumptions, 1, "{moment:?}");
+        assert_eq!(outcome.counters[&Counter::TrianglesScanned], 0, "{moment:?}");
     }
 }
 
@@ -188,12 +210,17 @@ fn a_file_that_is_gone_is_made_again() {
 fn another_input_or_setting_starts_anew() {
     let filmed = film(6, u64::MAX);
     let (_, image) = filmed.images.iter().rfind(|(m, _)| m.step == "sign").expect("an image");
-    let copy = Place::new();
-    copy_folder(&image.work_folder(), &copy.work_folder());
-    let settings = Settings { crease_deg: 30.0, ..filmed.settings };
-    let outcome = copy.repair(&filmed.input, &settings, &filmed.limits, &Void).expect("a result");
-    assert_eq!(outcome.resume.resumptions, 0);
-    assert!(outcome.counters[&Counter::InputBytesRead] > 0);
+    let settings = filmed.settings;
+    for settings in
+        [Settings { crease_deg: 30.0, ..settings }, Settings { method: Method::Mc, ..settings }]
+    {
+        let copy = Place::new();
+        copy_folder(&image.work_folder(), &copy.work_folder());
+        let outcome =
+            copy.repair(&filmed.input, &settings, &filmed.limits, &Void).expect("a result");
+        assert_eq!(outcome.resume.resumptions, 0);
+        assert!(outcome.counters[&Counter::InputBytesRead] > 0);
+    }
     let other = filmed.workshop.write(&sphere([0.0; 3], 1.0, 9), Encoding::Obj);
     let outcome = image.repair(&other, &filmed.settings, &filmed.limits, &Void).expect("a result");
     assert_eq!(outcome.resume.resumptions, 0);

@@ -135,8 +135,7 @@ impl Workshop {
         placed: &ContourStats,
     ) -> BrickFile {
         let resources = self.resources();
-        let separated =
-            separate(signs, cells, &model.domain, options, placed, &resources);
+        let separated = separate(signs, cells, &model.domain, options, placed, &resources);
         separated.expect("contour works").0
     }
 }

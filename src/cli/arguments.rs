@@ -33,6 +33,10 @@ pub struct ResultArguments {
     /// none.
     #[arg(long, value_name = "LENGTH", default_value_t = Reach::DEFAULT_DECIMATE)]
     decimate: Reach,
+    /// How the surface is drawn. The guarantees rest on mdc; the others are for comparison. Where
+    /// the proof of another one's file fails, the file is kept and the run ends with 4.
+    #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
+    method: MethodName,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
     #[arg(long)]
     strict: bool,
@@ -61,6 +65,29 @@ enum FillRuleName {
     Evenodd,
 }
 
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum MethodName {
+    /// Manifold dual contouring: creases and corners stay sharp.
+    Mdc,
+    /// Dual contouring: one vertex a cell, so not manifold where sheets share a cell.
+    Dc,
+    /// Dual marching cubes: vertices in the middle of their crossings, so creases are round.
+    Dmc,
+    /// Marching cubes: sound as well, but cuts creases and corners off, and leaves slivers.
+    Mc,
+}
+
+impl From<MethodName> for Method {
+    fn from(name: MethodName) -> Self {
+        match name {
+            MethodName::Mdc => Self::Mdc,
+            MethodName::Dc => Self::Dc,
+            MethodName::Dmc => Self::Dmc,
+            MethodName::Mc => Self::Mc,
+        }
+    }
+}
+
 impl ResultArguments {
     pub fn settings(&self) -> Settings {
         let depth = match (self.depth, self.tolerance) {
@@ -76,7 +103,7 @@ impl ResultArguments {
         };
         let (crease_deg, strict) = (self.crease, self.strict);
         let decimate = self.decimate;
-        Settings { depth, fill_rule, crease_deg, method: Method::Mdc, decimate, strict }
+        Settings { depth, fill_rule, crease_deg, method: self.method.into(), decimate, strict }
     }
 }
 

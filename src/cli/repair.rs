@@ -91,7 +91,8 @@ fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
 
 /// Tells the outcome, draws the preview.
 fn finish(arguments: &RepairArguments, outcome: &mut Outcome, chatter: &Chatter) -> ExitCode {
-    let mut exit = Exit::Success;
+    let sound = outcome.verdict != Verdict::Fail;
+    let mut exit = if sound { Exit::Success } else { Exit::NoResult };
     if let Some(path) = &arguments.preview
         && let Err(error) = draw(arguments, path)
     {
@@ -120,7 +121,11 @@ fn summary(outcome: &Outcome) -> String {
         outcome.output.area_ratio,
         proof.volume,
     );
-    if outcome.verdict == Verdict::Review {
+    if let Some(caveat) = &outcome.output.caveat {
+        text.push_str("\n  note: ");
+        text.push_str(caveat);
+    }
+    if outcome.verdict != Verdict::Pass {
         for reason in &outcome.reasons {
             text.push_str("\n  look: ");
             text.push_str(reason);

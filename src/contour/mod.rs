@@ -3,17 +3,23 @@
 //! In:         the brick file of sign generation.
 //! Out:        vertices and triangles into a [`crate::mesh::MeshSink`], numbered in Morton order of
 //!             the bricks.
-//! Invariant:  closed and 2-manifold by construction; every vertex strictly inside its cell, on
-//!             the lattice that the output file holds exactly; no triangle is degenerate.
+//! Invariant:  closed and 2-manifold by construction; every vertex strictly inside its cell (its
+//!             edge for [`mc`]), on the lattice that the output file holds exactly; no triangle is
+//!             degenerate.
 //! Units:      lattice units within a brick, model units at the sink.
-//! Memory:     per worker one brick and the border of its seven lower neighbours; 4 bytes a brick.
+//! Memory:     per worker one brick and the border of its seven lower (upper for [`mc`])
+//!             neighbours; 4 bytes a brick.
 //! Fails:      [`ContourError`]: the scratch disk, the sink, or bricks that contradict each other.
-//! Source:     that of the method; see [`mdc`].
+//! Source:     that of the method; see [`mdc`] and [`mc`].
 //!
-//! [`mdc`] is manifold dual contouring, the method that the guarantees rest on. Other methods get
-//! a folder beside it and an arm in [`place_vertices`] and [`write_surface`].
+//! [`mdc`] is manifold dual contouring, the method that the guarantees rest on. [`mc`] is marching
+//! cubes, for comparison. Another method gets a folder beside them, a [`Method`] with what it
+//! cannot promise, and an arm wherever the compiler asks for one: here, in `maker` and in `write`.
 
+pub mod mc;
 pub mod mdc;
+
+mod maker;
 
 #[cfg(test)]
 mod noise_tests;
@@ -47,6 +53,31 @@ pub enum Method {
     /// Dual marching cubes: the vertices of manifold dual contouring in the middle of their
     /// crossings.
     Dmc,
+    /// Marching cubes.
+    Mc,
+}
+
+impl Method {
+    /// What it cannot promise of its surface; `None` for the method that the guarantees rest on.
+    /// A proof that fails ends the run of that one only.
+    #[must_use]
+    pub const fn caveat(self) -> Option<&'static str> {
+        match self {
+            Self::Mdc => None,
+            Self::Dc => Some(
+                "dual contouring has one vertex a cell, so sheets that share a cell are joined \
+                 there, which is not manifold, and triangles may intersect",
+            ),
+            Self::Dmc => Some(
+                "dual marching cubes rounds creases and corners off, by up to a cell, and its \
+                 triangles may intersect",
+            ),
+            Self::Mc => Some(
+                "marching cubes cuts creases and corners off, by up to a cell, and leaves slivers \
+                 where the surface passes near a corner of the grid",
+            ),
+        }
+    }
 }
 
 /// Settings of contouring that change the result.
@@ -104,7 +135,7 @@ pub struct ContourStats {
     pub multi_cells: u64,
     /// Ambiguous faces that were flipped to keep the surface manifold, counted once per cell.
     pub flipped_faces: u64,
-    /// Vertices in cells.
+    /// Vertices in cells; on edges by marching cubes.
     pub cell_vertices: u64,
     /// Vertices that were pulled back into their cell.
     pub clamped_vertices: u64,
@@ -122,7 +153,7 @@ pub struct ContourStats {
     pub split_clusters: u64,
     /// Vertices on faces between cells.
     pub face_points: u64,
-    /// Polygons: one per crossed edge.
+    /// Polygons: one per crossed edge; one per boundary cycle of a cell by marching cubes.
     pub polygons: u64,
     /// Polygons drawn as a fan around their crossing.
     pub fans: u64,
@@ -159,7 +190,12 @@ pub fn place_vertices(
     options: &ContourOptions,
     resources: &Resources,
 ) -> Result<(BrickFile, ContourStats), ContourError> {
-    mdc::place_vertices(signs, domain, options, resources)
+    match options.method {
+        Method::Mdc | Method::Dc | Method::Dmc => {
+            mdc::place_vertices(signs, domain, options, resources)
+        }
+        Method::Mc => mc::place_vertices(signs, domain, resources),
+    }
 }
 
 /// Keeps surfaces apart that pass through one cell of `cells`, which were placed from `signs`; the

@@ -7,13 +7,13 @@ use std::convert::Infallible;
 
 use glam::DVec3;
 
+use crate::contour::mdc::cut_of;
 use crate::contour::{
     ContourOptions, ContourStats, Method, place_vertices, separate, write_surface,
 };
 use crate::mesh::shapes::{ListedTriangles, Random};
 use crate::mesh::{MeshSink, SinkState, SinkStats};
 use crate::monitor::Void;
-use crate::contour::mdc::cut_of;
 use crate::octree::{
     BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SnapBox,
     SourcePlane, decode_cells, edge_position, encode,
@@ -28,9 +28,9 @@ const NOISE: std::ops::Range<usize> = 16..48;
 
 /// A sink that keeps everything.
 #[derive(Default)]
-struct Kept {
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[u32; 3]>,
+pub struct Kept {
+    pub vertices: Vec<[f64; 3]>,
+    pub triangles: Vec<[u32; 3]>,
 }
 
 impl MeshSink for Kept {
@@ -65,11 +65,11 @@ impl MeshSink for Kept {
 }
 
 /// Signs of all corners of the grid, and hits on its edges that look the same from every brick.
-struct Field {
-    seed: u64,
-    inside_share: f64,
-    patch_share: f64,
-    decimate_cells: f64,
+pub struct Field {
+    pub seed: u64,
+    pub inside_share: f64,
+    pub patch_share: f64,
+    pub decimate_cells: f64,
 }
 
 impl Field {
@@ -137,13 +137,18 @@ enum Hit {
 }
 
 /// What came of a field.
-struct Contoured {
-    kept: Kept,
-    proof: Proof,
-    stats: ContourStats,
+pub struct Contoured {
+    pub kept: Kept,
+    pub proof: Proof,
+    pub stats: ContourStats,
 }
 
 fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
+    contour_by(Method::Mdc, field, backing, threads)
+}
+
+/// Contours a field by a method and proves what comes of it.
+pub fn contour_by(method: Method, field: &Field, backing: Backing, threads: usize) -> Contoured {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -165,19 +170,20 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
     }
     let signs = writer.finish(2).expect("room");
     let decimate_cells = field.decimate_cells;
-    let options = ContourOptions { method: Method::Mdc, crease_deg: 12.0, decimate_cells };
+    let options = ContourOptions { method, crease_deg: 12.0, decimate_cells };
     let (cells, placed) =
         place_vertices(&signs, &domain, &options, &resources).expect("sound bricks");
     let (surface, separated) =
         separate(&signs, &cells, &domain, &options, &placed, &resources).expect("sound bricks");
-    for file in [&cells, &surface] {
-        assert_vertices_lie_in_their_cells(file, &domain);
+    if method != Method::Mc {
+        for file in [&cells, &surface] {
+            assert_vertices_lie_in_their_cells(file, &domain);
+        }
     }
     let mut kept = Kept::default();
     let files = (&cells, &surface);
-    let stats =
-        write_surface(files, &domain, &options, (&separated, None), &mut kept, &resources)
-            .expect("sound bricks");
+    let stats = write_surface(files, &domain, &options, (&separated, None), &mut kept, &resources)
+        .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
     let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };
     let proof_options = ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked };

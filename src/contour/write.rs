@@ -3,21 +3,17 @@
 //! In:         cells of all bricks, and a sink.
 //! Out:        the sink has taken everything.
 //! Invariant:  what the sink takes does not depend on where an earlier run was stopped.
-//! Memory:     4 bytes a brick, and what [`Polygons`] holds.
+//! Memory:     4 bytes a brick, and what the [`Maker`] holds.
 
 use serde::{Deserialize, Serialize};
 
-use crate::contour::mdc::{BrickTriangles, FAN_POINT, Layers, Polygons, VERTICES};
-use crate::contour::{ContourError, ContourOptions, ContourStats, Method};
+use crate::contour::maker::Maker;
+use crate::contour::mdc::{BrickTriangles, FAN_POINT, Layers, VERTICES};
+use crate::contour::{ContourError, ContourOptions, ContourStats, Method, mc};
 use crate::mesh::{MeshSink, SinkState};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::Domain;
 use crate::store::{BrickFile, Progress, Resources, StoreError, ordered_by_weight};
-
-/// What a byte of a record of cells takes as triangles.
-const FACTOR: u64 = 4;
-/// The same where triangles come with their corners.
-const FACTOR_WITH_CORNERS: u64 = 18;
 
 /// What can go wrong while the surface is written.
 #[derive(Debug, thiserror::Error)]
@@ -74,7 +70,6 @@ where
     S::Error: Send,
 {
     let cells = Layers::new(cells, Some(surface));
-    let is_careful = options.method == Method::Mdc;
     let bases = number_vertices(&cells)?;
     let vertices = u64::from(*bases.last().unwrap_or(&0));
     let (items, stats) = match start {
@@ -82,7 +77,8 @@ where
         None => (0, ContourStats { vertices, ..*placed }),
     };
     let saved_bytes = sink.bytes_so_far();
-    let mut writing = Writing { cells, is_careful, domain, sink, resources, items, stats, saved_bytes };
+    let method = options.method;
+    let mut writing = Writing { method, cells, domain, sink, resources, items, stats, saved_bytes };
     resources.monitor.advance(items);
     writing.vertices()?;
     writing.triangles(&bases)?;
@@ -108,7 +104,7 @@ fn number_vertices(cells: &Layers) -> Result<Vec<u32>, StoreError> {
 /// A surface on its way into the sink.
 struct Writing<'w, S: ?Sized> {
     cells: Layers<'w>,
-    is_careful: bool,
+    method: Method,
     domain: &'w Domain,
     sink: &'w mut S,
     resources: &'w Resources<'w>,
@@ -129,7 +125,14 @@ where
                 self.save()?;
                 return Err(StoreError::Cancelled.into());
             }
-            self.read_positions(number, &mut positions)?;
+            match self.method {
+                Method::Mdc | Method::Dc | Method::Dmc => {
+                    self.read_positions(number, &mut positions)?;
+                }
+                Method::Mc => {
+                    mc::read_positions(self.cells.first(), number, self.domain, &mut positions)?;
+                }
+            }
             self.resources.monitor.gauge(Gauge::ResidentVertices, positions.len() as u64);
             self.sink.vertices(&positions).map_err(WriteError::Sink)?;
             self.item_done()?;
@@ -164,10 +167,11 @@ where
     /// Writes the triangles of the bricks that are left.
     fn triangles(&mut self, bases: &[u32]) -> Result<(), WriteError<S::Error>> {
         let (cells, domain, resources) = (self.cells, self.domain, self.resources);
-        let (with_corners, is_careful) = (self.sink.needs_corners(), self.is_careful);
+        let with_corners = self.sink.needs_corners();
         let mut numbers = self.items as usize - cells.len()..cells.len();
         let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-        let factor = if with_corners { FACTOR_WITH_CORNERS } else { FACTOR };
+        let (method, factors) = (self.method, self.method.factors());
+        let factor = if with_corners { factors.with_corners } else { factors.plain };
         let written = ordered_by_weight(
             resources.pool,
             resources.scales(|number: &usize| factor * cells.record_bytes(*number)),
@@ -177,10 +181,10 @@ where
                 }
                 Ok(numbers.next())
             },
-            || Polygons::new(cells, bases, domain, is_careful, with_corners),
-            |polygons, number| {
+            || Maker::new(method, cells, bases, domain, with_corners),
+            |maker, number| {
                 let _brick = resident.hold(1);
-                Ok(polygons.triangles(number)?)
+                Ok(maker.triangles(number)?)
             },
             |brick| self.take(brick),
         );

@@ -1,8 +1,8 @@
 //! The records of bricks: what lies in a brick file, as rkyv archives.
 //!
 //! One kind per stage that writes them: [`HitBrick`] (scan), [`SignBrick`] (sign), and
-//! [`crate::octree::CellBrick`] (contour). All are validated before they are read; the store has checked their
-//! hash before that.
+//! [`crate::octree::CellBrick`] (contour; that of marching cubes is in `edge_brick`). All are
+//! validated before they are read; the store has checked their hash before that.
 //!
 //! Units: positions and plane offsets in lattice units from the brick's min corner.
 
@@ -185,7 +185,12 @@ where
     rkyv::api::high::to_bytes_in::<_, BoxedError>(brick, room).expect("plain vectors serialise")
 }
 
-pub(crate) fn out_of_range(kind: &'static str, field: &'static str, found: u64, limit: u64) -> BrickError {
+pub(crate) fn out_of_range(
+    kind: &'static str,
+    field: &'static str,
+    found: u64,
+    limit: u64,
+) -> BrickError {
     BrickError::OutOfRange { kind, field, found, limit }
 }
 

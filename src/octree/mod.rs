@@ -6,6 +6,7 @@ mod brick;
 mod cell_brick;
 mod domain;
 mod edge_bits;
+mod edge_brick;
 mod flips;
 mod index;
 mod key;
@@ -22,6 +23,7 @@ pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{
     AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,
 };
+pub use edge_brick::{ArchivedEdgeBrick, EdgeBrick, decode_edges};
 pub use flips::{FLIPS, Flip, FlipReader, FlipRecord, Flips};
 pub use index::{BrickIndex, Neighbour};
 pub use key::BrickKey;

@@ -2,6 +2,7 @@
 
 use std::collections::BTreeMap;
 
+use crate::defect::DefectKind;
 use crate::monitor::{Counter, Gauge, Monitor};
 use crate::repair::outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
@@ -11,7 +12,8 @@ use crate::repair::run::Run;
 use crate::repair::settings::Depth;
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
-use crate::verify::Proof;
+use crate::sign::FillRule;
+use crate::verify::{Failure, Proof};
 
 /// Losing more than this share of the area is worth a look.
 const LOST_AREA_SHARE: f64 = 0.2;
@@ -38,12 +40,14 @@ pub fn conclude(
     };
     let dropped = dropped(&findings);
     let area_ratio = proof.area / findings.measure.area;
-    let reasons = reasons(run, &findings, &invented, &dropped, area_ratio, &proof);
+    let broken = broken_promises(&proof, run.settings.fill_rule);
+    let mut reasons = reasons(run, &findings, &invented, &dropped, area_ratio, &proof);
+    let verdict = judge(&broken, &mut reasons);
     run.recording.gauge(Gauge::GrantedBytes, run.accountant.peak_bytes());
     Outcome {
         schema: SCHEMA_VERSION,
         version: env!("CARGO_PKG_VERSION").to_owned(),
-        verdict: if reasons.is_empty() { Verdict::Pass } else { Verdict::Review },
+        verdict,
         reasons,
         input: SoupReport {
             path: run.input.to_path_buf(),
@@ -70,6 +74,7 @@ pub fn conclude(
             proof,
             area_ratio,
             contour: findings.contour,
+            caveat: run.settings.method.caveat().map(str::to_owned),
         },
         scan: findings.scan,
         patch: findings.patch,
@@ -89,6 +94,31 @@ pub fn conclude(
         },
         resume: ResumeReport { resumptions: workspace.resumptions(), rebuilt },
     }
+}
+
+/// The verdict; promises that are broken are the first reason.
+fn judge(broken: &[String], reasons: &mut Vec<String>) -> Verdict {
+    if !broken.is_empty() {
+        reasons.insert(0, format!("The output is not sound: {}", broken.join("; ")));
+        return Verdict::Fail;
+    }
+    if reasons.is_empty() { Verdict::Pass } else { Verdict::Review }
+}
+
+/// Why a proof does not hold, but for nesting where the fill rule leaves that open.
+pub fn broken_promises(proof: &Proof, rule: FillRule) -> Vec<String> {
+    let nested = rule == FillRule::Evenodd;
+    let failures = proof.failures();
+    let broken = failures.iter().filter(|failure| !(nested && is_about_nesting(failure)));
+    broken.map(ToString::to_string).collect()
+}
+
+/// Whether a failure is about which way a component faces, and nothing else.
+fn is_about_nesting(failure: &Failure) -> bool {
+    matches!(
+        failure,
+        Failure::Defects(DefectKind::InwardComponent, _) | Failure::UndecidedComponents(_)
+    )
 }
 
 fn dropped(findings: &Findings) -> Dropped {
@@ -162,4 +192,31 @@ fn reasons(
         }
     }
     reasons
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_surface_that_is_not_sound_fails_whatever_else_there_is_to_look_at() {
+        let sound = Proof { triangles: 4, ..Proof::default() };
+        let pinched = Proof { nonmanifold_edges: 2, ..sound.clone() };
+        let broken = broken_promises(&pinched, FillRule::Solid);
+        let mut reasons = vec!["Much area is gone".to_owned()];
+        assert_eq!(judge(&broken, &mut reasons), Verdict::Fail);
+        assert_eq!(reasons[0], "The output is not sound: 2 non-manifold edges");
+        let broken = broken_promises(&sound, FillRule::Solid);
+        assert_eq!(judge(&broken, &mut reasons[1..].to_vec()), Verdict::Review);
+        assert_eq!(judge(&broken, &mut Vec::new()), Verdict::Pass);
+    }
+
+    #[test]
+    fn nesting_is_a_promise_of_the_solid_fill_rule_only() {
+        let nested = Proof { triangles: 8, inward_components: 1, ..Proof::default() };
+        assert_eq!(broken_promises(&nested, FillRule::Solid).len(), 1);
+        assert!(broken_promises(&nested, FillRule::Evenodd).is_empty());
+        let open = Proof { boundary_edges: 3, ..nested };
+        assert_eq!(broken_promises(&open, FillRule::Evenodd), ["3 boundary edges"]);
+    }
 }

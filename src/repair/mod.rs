@@ -23,11 +23,11 @@ mod workspace;
 
 pub use error::{Blame, RepairError};
 pub use estimate::{Bounds, Counts, DiskSteps, ESTIMATE_VERSION, Estimate, estimate};
+pub use length::{Length, LengthError, Reach};
 pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::repair;
-pub use length::{Length, LengthError, Reach};
 pub use settings::{Depth, Limits, Settings};

@@ -26,6 +26,8 @@ pub enum Verdict {
     Pass,
     /// Sound, but a person should look: the reasons say at what.
     Review,
+    /// Not sound, which only a method with a caveat may end with: the reasons say how.
+    Fail,
 }
 
 /// The input as it came.
@@ -102,6 +104,8 @@ pub struct OutputReport {
     pub area_ratio: f64,
     /// Counts of contouring.
     pub contour: ContourStats,
+    /// What the method cannot promise, if it is not the one that the guarantees rest on.
+    pub caveat: Option<String>,
 }
 
 /// What a stage took; the caller stamps the seconds.

@@ -3,9 +3,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::contour::{
-    CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate, write_surface,
+    CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
+    write_surface,
 };
-use crate::defect::DefectKind;
 use crate::ingest::{
     BinEntry, Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, fill_bins,
     read_soup, settle,
@@ -17,13 +17,14 @@ use crate::octree::{BrickKey, Domain, DropRecord, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::depth::choose_domain;
+use crate::repair::finish::broken_promises;
 use crate::repair::run::Run;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, SpoolPeek, StoreError};
-use crate::verify::{Failure, Outward, Proof, ProofOptions, prove};
+use crate::verify::{Outward, Proof, ProofOptions, prove};
 
 /// What the finished steps found out; a checkpoint remembers it besides the files.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -266,9 +267,15 @@ impl Run<'_> {
         let mut sink = sink.map_err(RepairError::Output)?;
         let placed = (&findings.contour, start);
         let options = self.contour_options(findings);
-        findings.contour =
-            write_surface((cells, surface), findings.domain(), &options, placed, &mut *sink, resources)
-                .map_err(RepairError::from_write)?;
+        findings.contour = write_surface(
+            (cells, surface),
+            findings.domain(),
+            &options,
+            placed,
+            &mut *sink,
+            resources,
+        )
+        .map_err(RepairError::from_write)?;
         (handles.cells, handles.surface) = (None, None);
         let written = sink.finish().map_err(RepairError::Output)?;
         self.recording.count(Counter::OutputBytesWritten, written.file.bytes);
@@ -300,17 +307,14 @@ impl Run<'_> {
             .map_err(RepairError::from_verify)?;
         // Cavities face inward, and where two components share a cell they may cross: then nesting
         // does not tell which way one should face. That is for a person, see the reasons.
-        let nested = self.settings.fill_rule == FillRule::Evenodd;
-        let failures = proof.failures();
-        if failures.iter().all(|failure| nested && is_about_nesting(failure)) {
+        // What other methods do not promise is no bug either: the outcome tells it.
+        let failures = broken_promises(&proof, self.settings.fill_rule);
+        if failures.is_empty() || self.settings.method.caveat().is_some() {
             findings.proof = Some(proof);
             return Ok(Vec::new());
         }
-        let failures: Vec<String> = failures.iter().map(ToString::to_string).collect();
-        Err(RepairError::ProofFailed {
-            failures: failures.join("; "),
-            folder: workspace.folder().to_path_buf(),
-        })
+        let folder = workspace.folder().to_path_buf();
+        Err(RepairError::ProofFailed { failures: failures.join("; "), folder })
     }
 }
 
@@ -373,14 +377,6 @@ fn flood_bricks(
     let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
     let flooded = flood(hits, &flips, findings.domain(), resources).map_err(RepairError::Sign)?;
     Ok(flooded.files())
-}
-
-/// Whether a failure is about which way a component faces, and nothing else.
-pub fn is_about_nesting(failure: &Failure) -> bool {
-    matches!(
-        failure,
-        Failure::Defects(DefectKind::InwardComponent, _) | Failure::UndecidedComponents(_)
-    )
 }
 
 /// Walks bins and drops side by side.

@@ -208,7 +208,8 @@ impl Polygon {
         let (this, next) = (self.patches[i], self.patches[(i + 1) % self.count]);
         let (u, v) = ((self.edge.axis + 1) % 3, (self.edge.axis + 2) % 3);
         // From (-,-) up along u, up along v, down along u, down along v.
-        let (axis, is_up) = [(u, true), (v, true), (u, false), (v, false)][usize::from(self.last[i])];
+        let (axis, is_up) =
+            [(u, true), (v, true), (u, false), (v, false)][usize::from(self.last[i])];
         if is_up {
             Arc { axis, lower: this, upper: next }
         } else {
@@ -252,4 +253,3 @@ impl Polygon {
         })))
     }
 }
-

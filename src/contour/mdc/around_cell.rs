@@ -166,9 +166,10 @@ impl AroundCell {
     ) -> Result<(), ContourError> {
         let Edge { axis, lower } = polygon.edge;
         let (crossing, inside_below) = nb.crossing(axis, lower)?;
-        let id = lower.iter().fold(axis as u64, |id, c| {
-            id * (2 * SIDE as u64) + (c + SIDE as i32 / 2) as u64
-        }) | CROSSING;
+        let id = lower
+            .iter()
+            .fold(axis as u64, |id, c| id * (2 * SIDE as u64) + (c + SIDE as i32 / 2) as u64)
+            | CROSSING;
         let patches = polygon.patches();
         self.is_near_flagged |= patches.iter().any(|patch| patch.vertex.cut.is_flagged());
         for (i, patch) in patches.iter().enumerate() {

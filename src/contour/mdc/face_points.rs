@@ -36,8 +36,8 @@ pub fn add(
     resources: &Resources,
 ) -> Result<BrickFile, ContourError> {
     let mut writer = BrickWriter::create(resources.scratch, SURFACE, resources.backing)?;
-    let mut numbers =
-        (0..layers.len()).filter(|number| layers.is_anew(*number) || may_have_points(layers, *number));
+    let mut numbers = (0..layers.len())
+        .filter(|number| layers.is_anew(*number) || may_have_points(layers, *number));
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered_by_weight(
         resources.pool,
@@ -96,10 +96,8 @@ fn face_points(nb: &mut Neighbourhood, number: usize) -> Result<Vec<FacePoint>, 
         let [(key, arc, one), (_, _, other)] = of_arc else {
             return Err(nb.contradiction("one arc between two cells"));
         };
-        let crossings = [
-            nb.crossing(one.axis, one.lower)?.0,
-            nb.crossing(other.axis, other.lower)?.0,
-        ];
+        let crossings =
+            [nb.crossing(one.axis, one.lower)?.0, nb.crossing(other.axis, other.lower)?.0];
         let position = arc.point(crossings, nb.cell_units());
         points.push(FacePoint { key: *key, position });
     }
@@ -130,7 +128,8 @@ fn add_ends(
         for &pair in pairs {
             let edges = edges_of(pair, at);
             let upper = nb.vertex(here, pair[0]);
-            let edge = crate::contour::mdc::cell::edge_in_cell(edges[0].axis, edges[0].lower, below);
+            let edge =
+                crate::contour::mdc::cell::edge_in_cell(edges[0].axis, edges[0].lower, below);
             let arc = Arc { axis, lower: nb.vertex(there, edge), upper };
             if arc.is_explicit(nb.cell_units()) {
                 let is_end = |edge: &Edge| arc.ends_at(edge, at);

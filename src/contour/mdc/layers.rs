@@ -18,6 +18,11 @@ impl<'f> Layers<'f> {
         Self { first, anew }
     }
 
+    /// The first file.
+    pub fn first(&self) -> &'f BrickFile {
+        self.first
+    }
+
     /// The number of bricks.
     pub fn len(&self) -> usize {
         self.first.len()

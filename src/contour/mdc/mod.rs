@@ -59,9 +59,10 @@ fn has_multi_leaf(brick: &CellBrick) -> bool {
     let mut clusters = brick.clusters.iter().peekable();
     brick.cells.iter().any(|&cell| {
         let number = cell & 0x7fff;
-        while clusters.next_if(|c| (**c & 0x7fff) + (1 << (3 * (**c >> 15 & 7))) <= number).is_some()
-        {
-        }
+        while clusters
+            .next_if(|c| (**c & 0x7fff) + (1 << (3 * (**c >> 15 & 7))) <= number)
+            .is_some()
+        {}
         let covered = clusters.peek().is_some_and(|cluster| **cluster & 0x7fff <= number);
         !covered && components_of(cell).count > 1
     })

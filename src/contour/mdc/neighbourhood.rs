@@ -6,9 +6,7 @@
 //! Fails:      [`ContourError::Contradiction`] where sound bricks have a cell and these do not.
 
 use crate::contour::ContourError;
-use crate::contour::mdc::cell::{
-    cell_mask, cell_number, components_of, edge_in_cell, number_at,
-};
+use crate::contour::mdc::cell::{cell_mask, cell_number, components_of, edge_in_cell, number_at};
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::loaded::{CutCell, Loaded, Vertex};
 use crate::contour::mdc::table::is_marked;

@@ -152,8 +152,7 @@ impl<'p> Polygons<'p> {
             let corners = ring.map(|patch| patch.vertex.position.map(i64::from));
             let quad = Quad { corners, axis: edge.axis, crossing: crossing.map(i64::from) };
             let cell_units = i64::from(self.nb.cell_units());
-            let cut =
-                if self.is_careful { quad.cut(cell_units) } else { quad.shorter_diagonal() };
+            let cut = if self.is_careful { quad.cut(cell_units) } else { quad.shorter_diagonal() };
             let [p, q, r, s] = ring.map(|patch| self.corner(&patch));
             match cut {
                 Cut::FirstThird => self.add(&[[p, q, r], [p, r, s]], inside_below, out),

@@ -85,7 +85,8 @@ pub fn separate(
         looks += 1;
         (anew, banned) = separation.look(Some(&anew), Look::Again, &near, looks)?;
     }
-    let surface = face_points::add(&Layers::new(cells, Some(&anew)), domain, &mut stats, resources)?;
+    let surface =
+        face_points::add(&Layers::new(cells, Some(&anew)), domain, &mut stats, resources)?;
     drop(anew);
     for name in LOOKS {
         resources.scratch.remove(name)?;

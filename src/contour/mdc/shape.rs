@@ -90,8 +90,7 @@ pub enum Shape {
 impl Loop {
     /// A loop without points.
     pub fn new(axis: usize, crossing: [i32; 3], inside_below: bool) -> Self {
-        let none =
-            LoopPoint { position: [0; 3], id: 0, is_leaf: false, is_face_point: false };
+        let none = LoopPoint { position: [0; 3], id: 0, is_leaf: false, is_face_point: false };
         Self { points: [none; 8], count: 0, axis, crossing, inside_below }
     }
 
@@ -114,8 +113,8 @@ impl Loop {
         match self.count {
             3 => {
                 let corners = [at(0), at(1), at(2)];
-                let is_sound = !is_degenerate(corners[0], corners[1], corners[2])
-                    && separates(corners, ends);
+                let is_sound =
+                    !is_degenerate(corners[0], corners[1], corners[2]) && separates(corners, ends);
                 if is_sound { Shape::Triangle } else { Shape::Fan }
             }
             4 => {
@@ -161,7 +160,8 @@ impl Loop {
     fn residual(&self, corners: &[[i64; 3]; 4], first: usize, [a, b]: [[i64; 3]; 2]) -> f64 {
         let [p, q, r, s] = [0, 1, 2, 3].map(|i| corners[(first + i) % 4]);
         let pierced = if orientation(p, r, a, b) < 0 { s } else { q };
-        let difference = |x: [i64; 3], y: [i64; 3]| DVec3::from([0, 1, 2].map(|i| (x[i] - y[i]) as f64));
+        let difference =
+            |x: [i64; 3], y: [i64; 3]| DVec3::from([0, 1, 2].map(|i| (x[i] - y[i]) as f64));
         let normal = difference(r, p).cross(difference(pierced, p));
         let way = difference(p, self.crossing.map(i64::from));
         let height = normal.dot(way) / normal[self.axis];

@@ -50,8 +50,7 @@ pub fn place_vertices(
     let mut pass = BrickPass::<ContourStats>::start(CELLS, resources)?;
     let mut numbers = pass.items() as usize..signs.len();
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    let factor =
-        if options.has_clusters() { RECORD_FACTOR_WITH_CLUSTERS } else { RECORD_FACTOR };
+    let factor = if options.has_clusters() { RECORD_FACTOR_WITH_CLUSTERS } else { RECORD_FACTOR };
     let placed = ordered_by_weight(
         resources.pool,
         resources.scales(|number: &usize| factor * signs.record_bytes(*number)),
@@ -242,9 +241,12 @@ impl Workspace {
         leaves.hits.clear();
         leaves.planes.clear();
         let cell_units = self.cell_units as f64;
-        leaves.planes.extend(self.planes.iter().zip(&self.normals[1..]).map(|(plane, &normal)| {
-            CellPlane { normal, offset: plane.offset / cell_units }
-        }));
+        leaves.planes.extend(
+            self.planes
+                .iter()
+                .zip(&self.normals[1..])
+                .map(|(plane, &normal)| CellPlane { normal, offset: plane.offset / cell_units }),
+        );
     }
 
     /// Adds the components of a cell to the leaves, before their vertices are placed.

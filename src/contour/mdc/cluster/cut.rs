@@ -52,7 +52,8 @@ impl Cut<'_> {
         brick.clusters.push(packed(cell) | (vertices.len() as u32) << 18);
         brick.positions.extend_from_slice(vertices);
         if vertices.len() > 1 {
-            let members = node_of[components].iter().map(|node| (*node as usize - first_node) as u8);
+            let members =
+                node_of[components].iter().map(|node| (*node as usize - first_node) as u8);
             brick.members.extend(members);
         }
     }
