@@ -139,6 +139,8 @@ pub struct ContourStats {
     pub cell_vertices: u64,
     /// Vertices that were pulled back into their cell.
     pub clamped_vertices: u64,
+    /// Vertices on creases or corners that their cells' own edges do not see.
+    pub feature_vertices: u64,
     /// Cells of the octree that became one vertex, or several.
     pub clusters: u64,
     /// Cells that did not because a vertex would lie too far from a plane.
@@ -171,6 +173,7 @@ impl ContourStats {
         self.flipped_faces += other.flipped_faces;
         self.cell_vertices += other.cell_vertices;
         self.clamped_vertices += other.clamped_vertices;
+        self.feature_vertices += other.feature_vertices;
         self.clusters += other.clusters;
         self.refused_by_error += other.refused_by_error;
         self.refused_by_shape += other.refused_by_shape;

@@ -6,10 +6,11 @@
 
 use glam::DVec3;
 
-use crate::contour::ContourStats;
 use crate::contour::mdc::INSET_UNITS;
+use crate::contour::mdc::features::Place;
 use crate::contour::mdc::table::{axis_of_edge, corner_of_edge};
 use crate::contour::mdc::vertices::Workspace;
+use crate::contour::{ContourError, ContourStats};
 use crate::geom::qef::{
     Attempt, Hit, QefOptions, Waiting, begin, solve, solve_flat, solve_together,
 };
@@ -61,11 +62,12 @@ impl Workspace {
     /// The vertex of the only component of a cell, now or with others that wait.
     pub(super) fn place_alone(
         &mut self,
+        place: Place,
         at: [usize; 3],
         edges: u16,
         brick: &mut CellBrick,
         stats: &mut ContourStats,
-    ) {
+    ) -> Result<(), ContourError> {
         let around = self.around(at, edges);
         let attempt = match around.flat_normal() {
             Some(normal) => {
@@ -80,7 +82,13 @@ impl Workspace {
         });
         match attempt {
             Attempt::Done(solution) => {
-                brick.positions.push(self.to_lattice(at, solution.position));
+                let mut position = solution.position;
+                if let Some((met, planes)) = self.toward_feature(place, at, &around, &solution)? {
+                    position = met;
+                    self.take_in(planes, at, met);
+                    stats.feature_vertices += 1;
+                }
+                brick.positions.push(self.to_lattice(at, position));
                 stats.clamped_vertices += u64::from(solution.clamped);
             }
             Attempt::Waiting(cell) => {
@@ -94,6 +102,7 @@ impl Workspace {
                 }
             }
         }
+        Ok(())
     }
 
     pub(super) fn place_waiting(&mut self, brick: &mut CellBrick, stats: &mut ContourStats) {

@@ -14,6 +14,7 @@ mod around_cell;
 mod cell;
 mod cluster;
 mod face_points;
+mod features;
 mod layers;
 mod leaf_vertex;
 mod loaded;

@@ -13,6 +13,7 @@ use crate::contour::mdc::cell::{FLIPPED_BIT, JOINED_BIT, components_of, number_a
 use crate::contour::mdc::cluster::{
     CellPlane, ClusterOptions, Clustering, JUDGES_ONLY, Leaves, PlaneHit,
 };
+use crate::contour::mdc::features::{Halo, Place};
 use crate::contour::mdc::leaf_vertex::WaitingCells;
 use crate::contour::mdc::table::{NO_FACE, TWO_SIDED};
 use crate::contour::mdc::{INSET_UNITS, flags_of};
@@ -120,11 +121,15 @@ pub struct Workspace {
     /// First crossing of each row of edges.
     row_starts: Vec<u32>,
     crossings: Vec<EdgeCrossing>,
-    planes: Vec<SourcePlane>,
+    /// Planes of the brick, and behind them those of edges that leave it.
+    pub(super) planes: Vec<SourcePlane>,
     pub(super) normals: Vec<DVec3>,
     pub(super) waiting: WaitingCells,
     clustering: Option<Clustering>,
     leaves: Leaves,
+    /// Cosine of the crease angle.
+    pub(super) crease_cosine: f64,
+    pub(super) halo: Halo,
     /// Corner signs of bricks beyond a side, for faces that two bricks must agree on.
     beyond: HashMap<u64, CornerBits>,
 }
@@ -155,6 +160,9 @@ impl Workspace {
             waiting: WaitingCells::default(),
             clustering: options.has_clusters().then(|| Clustering::new(cluster_options)),
             leaves: Leaves::default(),
+            // The cut-off is tan² of half the angle.
+            crease_cosine: (1.0 - qef.cutoff()) / (1.0 + qef.cutoff()),
+            halo: Halo::new(),
             beyond: HashMap::new(),
         }
     }
@@ -174,6 +182,7 @@ impl Workspace {
         let record = decode_signs(&view)?;
         self.load(record);
         self.beyond.clear();
+        self.halo.clear();
         self.touched.find(&self.marks);
         let mut stats = ContourStats::default();
         let mut brick = CellBrick { banned, ..CellBrick::default() };
@@ -249,6 +258,21 @@ impl Workspace {
         );
     }
 
+    /// Adds planes that pass the vertex of the last component to its crossings.
+    pub(super) fn take_in(&mut self, numbers: [u32; 2], at: [usize; 3], vertex: DVec3) {
+        if self.clustering.is_none() {
+            return;
+        }
+        let point = (vertex + DVec3::from(at.map(|c| c as f64)) + 0.5).as_vec3().to_array();
+        for number in numbers.into_iter().filter(|number| *number != 0) {
+            let normal = self.normals[number as usize];
+            let offset = self.planes[number as usize - 1].offset / self.cell_units as f64;
+            self.leaves.planes.push(CellPlane { normal, offset });
+            let plane = (self.leaves.planes.len() - 1) as u32;
+            self.leaves.hits.push(PlaneHit { plane, point });
+        }
+    }
+
     /// Adds the components of a cell to the leaves, before their vertices are placed.
     fn add_leaf(&mut self, at: [usize; 3], mask: u8, edge_masks: &[u16], first: usize) {
         self.leaves.components.push(first as u32);
@@ -270,6 +294,12 @@ impl Workspace {
                 self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
             }
         }
+    }
+
+    /// Whether the edge along `axis` from `at` is crossed.
+    #[inline]
+    pub(super) fn is_marked(&self, axis: usize, at: [usize; 3]) -> bool {
+        self.marks.rows(axis)[at[2] * LINES + at[1]] >> at[0] & 1 == 1
     }
 
     /// The crossing of a marked edge.
@@ -306,7 +336,8 @@ impl Workspace {
         if self.method == Method::Dmc {
             self.place_in_middle(at, masks, brick);
         } else if components.count == 1 {
-            self.place_alone(at, components.edge_masks[0], brick, stats);
+            let place = Place { signs, key };
+            self.place_alone(place, at, components.edge_masks[0], brick, stats)?;
         } else {
             self.place_apart(at, masks, brick, stats);
         }
