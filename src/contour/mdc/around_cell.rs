@@ -28,6 +28,8 @@ pub struct CellArc {
     pub point: [i32; 3],
     /// Whether the segment between the two vertices misses the face.
     pub is_missed: bool,
+    /// Whether the face point may be a vertex: if it is missed, or the cell beyond may be flagged.
+    may_be_explicit: bool,
 }
 
 /// One polygon at one vertex of the cell.
@@ -147,7 +149,9 @@ impl AroundCell {
             Some(known) => self.is_torn |= known.point != point,
             None => {
                 let is_missed = !arc.passes(nb.cell_units());
-                self.arcs.push(CellArc { mine, other, face, point, is_missed });
+                let beyond = if face % 2 == 0 { arc.lower } else { arc.upper }.vertex.cut;
+                let may_be_explicit = is_missed || (beyond.level() == 0 && beyond.is_multi());
+                self.arcs.push(CellArc { mine, other, face, point, is_missed, may_be_explicit });
             }
         }
         Ok(())
@@ -199,19 +203,22 @@ impl AroundCell {
         (self.arcs[arc].point, FACE_POINT | arc as u64)
     }
 
-    /// All triangles that a polygon at `vertex` may have, whatever is decided around the cell.
+    /// All triangles that a polygon at `vertex` may have if its own cell is not flagged.
     pub fn variants(&self, vertex: (u64, [i32; 3])) -> Vec<Triangle> {
         let plain = self.plain.iter().filter(|(of, _)| *of == vertex.0);
         let mut triangles: Vec<Triangle> = plain.map(|(_, triangle)| *triangle).collect();
+        let apex = (vertex.1, vertex.0);
         for corner in self.corners.iter().filter(|corner| corner.vertex == vertex.0) {
             for (arc, beyond) in [corner.before, corner.after] {
                 if !self.arcs[arc].is_missed {
                     let other = (beyond.vertex.position, beyond.id());
-                    triangles.push(triangle(corner.crossing, other, (vertex.1, vertex.0)));
+                    triangles.push(triangle(corner.crossing, other, apex));
+                }
+                if self.arcs[arc].may_be_explicit {
+                    triangles.push(triangle(corner.crossing, self.face_point(arc), apex));
                 }
             }
         }
-        triangles.extend(self.cone(vertex));
         triangles
     }
 

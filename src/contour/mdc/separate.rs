@@ -8,7 +8,7 @@
 //!             is a cone over a simple curve. One with several is flagged if triangles that it may
 //!             have, whatever its neighbours decide, meet; then its face points become vertices,
 //!             which confines it to itself. So no decision depends on another, and all are made at
-//!             once. A cluster that even so cannot be kept from meeting itself is split.
+//!             once. A cluster is split in place of being flagged.
 //! Units:      lattice units from the brick's min corner.
 //! Memory:     per worker what [`Neighbourhood`] holds.
 //! Fails:      [`ContourError`].
@@ -40,12 +40,23 @@ pub const LOOKS: [&str; 2] = ["look_odd.bricks", "look_even.bricks"];
 /// How cells are looked at.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Look {
-    /// For the first time: vertices of flagged cells move to the middle of their crossings.
+    /// For the first time: vertices of flagged leaf cells move to the middle of their crossings.
     First,
-    /// Again where vertices have moved: flagged cells get what they need.
+    /// The same after splits: what has moved stays.
+    FirstAgain,
+    /// Again where vertices have moved: flagged leaf cells get what they need.
     Second,
-    /// After splits: as the second, but also where nothing moved.
-    Again,
+    /// The same after splits, also where nothing has moved.
+    SecondAgain,
+}
+
+impl Look {
+    const fn after_splits(self) -> Self {
+        match self {
+            Self::First | Self::FirstAgain => Self::FirstAgain,
+            Self::Second | Self::SecondAgain => Self::SecondAgain,
+        }
+    }
 }
 
 /// What one look does to a brick.
@@ -73,20 +84,25 @@ pub fn separate(
     let mut stats = *placed;
     let separation = Separation { signs, cells, domain, options, resources };
     let everywhere = vec![true; cells.len()];
-    let (mut anew, _) = separation.look(None, Look::First, &everywhere, 0)?;
-    let mut banned;
-    let mut looks = 1;
-    (anew, banned) = separation.look(Some(&anew), Look::Second, &everywhere, looks)?;
-    while !banned.is_empty() {
-        stats.split_clusters += banned.iter().map(|(_, cells)| cells.len() as u64).sum::<u64>();
-        looks += 1;
-        anew = separation.split(&anew, &banned, looks)?;
-        let near = separation.near(&banned);
-        looks += 1;
-        (anew, banned) = separation.look(Some(&anew), Look::Again, &near, looks)?;
+    let mut anew = None;
+    let mut turn = 0;
+    for look in [Look::First, Look::Second] {
+        let (mut look, mut wanted) = (look, everywhere.clone());
+        loop {
+            let (looked, banned) = separation.look(anew.as_ref(), look, &wanted, turn)?;
+            anew = Some(looked);
+            turn += 1;
+            if banned.is_empty() {
+                break;
+            }
+            stats.split_clusters += banned.iter().map(|(_, cells)| cells.len() as u64).sum::<u64>();
+            anew = Some(separation.split(anew.as_ref(), &banned, turn)?);
+            turn += 1;
+            (look, wanted) = (look.after_splits(), separation.near(&banned));
+        }
     }
     let surface =
-        face_points::add(&Layers::new(cells, Some(&anew)), domain, &mut stats, resources)?;
+        face_points::add(&Layers::new(cells, anew.as_ref()), domain, &mut stats, resources)?;
     drop(anew);
     for name in LOOKS {
         resources.scratch.remove(name)?;
@@ -157,11 +173,11 @@ impl Separation<'_> {
     /// The bricks of `before`, with those that have clusters to split made again.
     fn split(
         &self,
-        before: &BrickFile,
+        before: Option<&BrickFile>,
         banned: &Banned,
         turn: usize,
     ) -> Result<BrickFile, ContourError> {
-        let layers = Layers::new(self.cells, Some(before));
+        let layers = Layers::new(self.cells, before);
         let resources = self.resources;
         let name = LOOKS[turn % 2];
         let mut writer = BrickWriter::create(resources.scratch, name, resources.backing)?;
@@ -170,7 +186,7 @@ impl Separation<'_> {
             let key = layers.key(number);
             let more = banned.binary_search_by_key(&number, |(number, _)| *number).ok();
             let Some(more) = more.map(|at| &banned[at].1) else {
-                if let Some(known) = before.find(key.0) {
+                if let Some((before, known)) = before.and_then(|b| Some((b, b.find(key.0)?))) {
                     let flags = before.directory()[known].flags;
                     writer.append(key.0, flags, &before.view(known)?)?;
                 }
@@ -281,36 +297,36 @@ fn decide(
     was_flagged: bool,
 ) -> Result<Decision, ContourError> {
     let around = AroundCell::gather(nb, cut, ranks)?;
-    if around.is_torn && cut.side > 1 {
-        return Ok(Decision::Split);
+    if cut.side > 1 {
+        // The middle of a few crossings is no place for a vertex that stands for many.
+        let is_clash = around.is_torn || clash(&around, AroundCell::variants);
+        return Ok(if is_clash { Decision::Split } else { Decision::Sound });
     }
-    // In the second look nothing has changed where no vertex moved.
-    let must_test = match look {
+    let may_clash = match look {
         Look::First => true,
+        Look::FirstAgain | Look::SecondAgain => !was_flagged,
+        // Nothing has changed where no vertex moved.
         Look::Second => around.is_near_flagged,
-        Look::Again => !was_flagged,
     };
-    let keeps_flag = look == Look::Again && was_flagged;
-    let is_clash = keeps_flag || (must_test && clash(&around, AroundCell::variants));
-    if !is_clash {
+    let keeps_flag = was_flagged && look != Look::Second;
+    if !keeps_flag && !(may_clash && clash(&around, AroundCell::variants)) {
         return Ok(Decision::Sound);
     }
-    let cell_units = nb.cell_units();
-    if look == Look::First {
-        return Ok(Decision::Flagged(middles(&around, cut, cell_units)));
+    match look {
+        Look::FirstAgain if was_flagged => return Ok(Decision::Flagged(around.vertices)),
+        Look::First | Look::FirstAgain => {
+            return Ok(Decision::Flagged(middles(&around, cut, nb.cell_units())));
+        }
+        Look::Second | Look::SecondAgain => {}
     }
     if !clash(&around, AroundCell::cone) {
         return Ok(Decision::Flagged(around.vertices));
     }
     let mut moved = around;
-    moved.vertices = middles(&moved, cut, cell_units);
-    if !clash(&moved, AroundCell::cone) {
-        return Ok(Decision::Flagged(moved.vertices));
+    moved.vertices = middles(&moved, cut, nb.cell_units());
+    if clash(&moved, AroundCell::cone) {
+        moved.vertices = between_face_points(&moved);
     }
-    if cut.side > 1 {
-        return Ok(Decision::Split);
-    }
-    moved.vertices = between_face_points(&moved);
     Ok(Decision::Flagged(moved.vertices))
 }
 

@@ -188,7 +188,13 @@ impl Clustering {
                 if hit.plane & JUDGES_ONLY == 0 && fits {
                     let group = Group::of(hit, &leaves.planes);
                     let from = node.first_group as usize;
-                    fits = add_group(&mut self.groups, from, &group, self.cosine_squared);
+                    fits = add_group(
+                        &mut self.groups,
+                        from,
+                        &group,
+                        &leaves.planes,
+                        self.cosine_squared,
+                    );
                 }
             }
             node.groups = self.groups.len() as u32 - node.first_group;
@@ -223,7 +229,7 @@ impl Clustering {
         let pieces = (0..count).filter(|i| self.joined[*i] as usize == *i).count();
         self.merged.resize(pieces, Node::EMPTY);
         self.number_and_add(first_node, octants, child_ends);
-        self.merge_groups(first_node, first_group);
+        self.merge_groups(&cut.leaves.planes, first_node, first_group);
         let components = cut.components_in(&cell.leaves);
         for node in &mut self.node_of[components] {
             *node = first_node as u32 + self.joined[*node as usize - first_node];
@@ -287,7 +293,7 @@ impl Clustering {
     }
 
     /// The groups of the new pieces, in place of those of their children.
-    fn merge_groups(&mut self, first_node: usize, first_group: usize) {
+    fn merge_groups(&mut self, planes: &[CellPlane], first_node: usize, first_group: usize) {
         for (number, node) in self.merged.iter_mut().enumerate() {
             let from = self.merged_groups.len();
             let mut fits = true;
@@ -300,7 +306,7 @@ impl Clustering {
                 let range = child.first_group as usize..(child.first_group + child.groups) as usize;
                 for group in &self.groups[range] {
                     let groups = &mut self.merged_groups;
-                    fits = fits && add_group(groups, from, group, self.cosine_squared);
+                    fits = fits && add_group(groups, from, group, planes, self.cosine_squared);
                 }
             }
             node.first_group = (first_group + from) as u32;

@@ -57,9 +57,10 @@ impl Group {
     }
 
     /// Takes `other` in if its normals point the same way, up to sign.
-    fn take_in(&mut self, other: &Self, cosine_squared: f64) -> bool {
-        if self.plane == other.plane && self.plane != MIXED {
-            self.normals += other.normals;
+    fn take_in(&mut self, other: &Self, planes: &[CellPlane], cosine_squared: f64) -> bool {
+        if self.is_same_plane(other, planes) {
+            let dot = self.normals.dot(other.normals);
+            self.normals += if dot < 0.0 { -other.normals } else { other.normals };
         } else {
             let (a, b) = (self.normals, other.normals);
             let dot = a.dot(b);
@@ -72,6 +73,17 @@ impl Group {
         self.points += other.points;
         self.count += other.count;
         true
+    }
+
+    /// Whether both are of one plane: by its number, or as two triangles of one face have it.
+    fn is_same_plane(&self, other: &Self, planes: &[CellPlane]) -> bool {
+        if self.plane == MIXED || other.plane == MIXED {
+            return false;
+        }
+        let [a, b] = [self, other].map(|group| &planes[group.plane as usize]);
+        self.plane == other.plane
+            || (a.normal == b.normal && a.offset == b.offset)
+            || (a.normal == -b.normal && a.offset == -b.offset)
     }
 
     /// The group as one crossing of its mean plane, about `centre`.
@@ -93,8 +105,14 @@ impl Group {
 }
 
 /// Adds `group` to a list of groups that starts at `from`; false if there is no room.
-pub fn add_group(groups: &mut Vec<Group>, from: usize, group: &Group, cosine_squared: f64) -> bool {
-    if groups[from..].iter_mut().any(|known| known.take_in(group, cosine_squared)) {
+pub fn add_group(
+    groups: &mut Vec<Group>,
+    from: usize,
+    group: &Group,
+    planes: &[CellPlane],
+    cosine_squared: f64,
+) -> bool {
+    if groups[from..].iter_mut().any(|known| known.take_in(group, planes, cosine_squared)) {
         return true;
     }
     let has_room = groups.len() - from < MAX_GROUPS;
