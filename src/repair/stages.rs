@@ -118,7 +118,8 @@ impl Run<'_> {
             Step::Flood | Step::Sign => findings.scan.bricks,
             Step::Place => findings.sign.bricks,
             Step::Write => 2 * findings.sign.bricks,
-            Step::Prove => findings.written.triangles,
+            // Read once, and joined once.
+            Step::Prove => 2 * findings.written.triangles,
         }
     }
 
@@ -262,14 +263,21 @@ impl Run<'_> {
             FillRule::Solid => Outward::AllPositive,
             FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
-        let proof_options = ProofOptions { share_bytes: resources.share_bytes / 2, outward };
-        let proof = prove(&mut open, resources.scratch, &proof_options, &self.recording)
+        let proof_options = ProofOptions {
+            share_bytes: resources.share_bytes / 2,
+            outward,
+            intersections: true,
+        };
+        let proof = prove(&mut open, resources.scratch, &proof_options, resources.pool, &self.recording)
             .map_err(RepairError::from_verify)?;
         // Cavities face inward, and where two components share a cell they may cross: then nesting
         // does not tell which way one should face. That is for a person, see the reasons.
         let nested = self.settings.fill_rule == FillRule::Evenodd;
         let failures = proof.failures();
-        if failures.iter().all(|failure| nested && is_about_nesting(failure)) {
+        if failures
+            .iter()
+            .all(|failure| nested && is_about_nesting(failure) || is_about_intersections(failure))
+        {
             findings.proof = Some(proof);
             return Ok(Vec::new());
         }
@@ -340,6 +348,11 @@ fn flood_bricks(
     let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
     let flooded = flood(hits, &flips, findings.domain(), resources).map_err(RepairError::Sign)?;
     Ok(flooded.files())
+}
+
+/// Whether a failure is about intersections, which the construction does not exclude yet.
+fn is_about_intersections(failure: &Failure) -> bool {
+    matches!(failure, Failure::Defects(DefectKind::IntersectingTriangles, _))
 }
 
 /// Whether a failure is about which way a component faces, and nothing else.
