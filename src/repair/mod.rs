@@ -29,3 +29,4 @@ pub use outcome::{
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::repair;
 pub use settings::{Depth, Length, Limits, Settings};
+pub use stages::is_about_intersections;

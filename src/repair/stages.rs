@@ -350,8 +350,10 @@ fn flood_bricks(
     Ok(flooded.files())
 }
 
-/// Whether a failure is about intersections, which the construction does not exclude yet.
-fn is_about_intersections(failure: &Failure) -> bool {
+/// Whether a failure is about intersections: the construction does not exclude them yet, so they
+/// are counted and fail no run.
+#[must_use]
+pub fn is_about_intersections(failure: &Failure) -> bool {
     matches!(failure, Failure::Defects(DefectKind::IntersectingTriangles, _))
 }
 

@@ -111,8 +111,7 @@ pub fn prove<'s, E: Error + Send>(
         wanted.then(|| Intersections::new(scratch, options.share_bytes, pool))
     };
     let mut intersections = asked();
-    let sound =
-        prove_sound(&mut *start()?, scratch, options, intersections.as_mut(), monitor)?;
+    let sound = prove_sound(&mut *start()?, scratch, options, intersections.as_mut(), monitor)?;
     let proof = match sound {
         Some(mut proof) => {
             enter_intersections(intersections, &mut proof, pool, monitor)?;

@@ -127,7 +127,8 @@ fn proof(solid: &Solid, indexed: bool, outward: Outward, share_bytes: u64) -> (P
     let scratch = Scratch::new(folder.path());
     let mut open = || Ok(Box::new(Memory { solid, indexed, next: 0 }) as ProvedSource<'_, _>);
     let options = ProofOptions { share_bytes, outward, intersections: false };
-    let proof = prove(&mut open, &scratch, &options, &pool(1), &Void).expect("nothing fails in memory");
+    let proof =
+        prove(&mut open, &scratch, &options, &pool(1), &Void).expect("nothing fails in memory");
     (proof, scratch.written_bytes())
 }
 
@@ -329,14 +330,12 @@ fn a_sound_surface_has_the_same_proof_in_one_pass_and_from_the_tape() {
     many.triangles.sort_unstable_by_key(|t| t.map(|id| id.wrapping_mul(0x9E37_79B9)));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
-    let options = ProofOptions {
-        share_bytes: 8 << 20,
-        outward: Outward::AllPositive,
-        intersections: false,
-    };
+    let options =
+        ProofOptions { share_bytes: 8 << 20, outward: Outward::AllPositive, intersections: false };
     for indexed in [true, false] {
         let source = || Memory { solid: &many, indexed, next: 0 };
-        let at_once = prove_sound(&mut source(), &scratch, &options, None, &Void).expect("no failure");
+        let at_once =
+            prove_sound(&mut source(), &scratch, &options, None, &Void).expect("no failure");
         let mut prover = Prover::new(&scratch, &options, &Void);
         prover.read(&mut source(), None).expect("no failure");
         let taped = prover.judge().expect("no failure");
@@ -360,11 +359,8 @@ fn a_request_to_stop_is_heard() {
     let solid = unit_cube();
     let source = || Box::new(Memory { solid: &solid, indexed: true, next: 0 });
     let mut open = || Ok(source() as ProvedSource<'_, _>);
-    let options = ProofOptions {
-        share_bytes: 1 << 20,
-        outward: Outward::NotAsked,
-        intersections: true,
-    };
+    let options =
+        ProofOptions { share_bytes: 1 << 20, outward: Outward::NotAsked, intersections: true };
     let answer = prove(&mut open, &Scratch::new(folder.path()), &options, &pool(1), &Impatient);
     assert!(matches!(
         answer,

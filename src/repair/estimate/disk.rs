@@ -58,6 +58,9 @@ const POSITION_BYTES: f64 = 24.0;
 /// numbers and fans; without numbers in the file also a sort of the positions.
 const TAPE_BYTES: f64 = 130.0;
 const UNNUMBERED_TAPE_BYTES: f64 = 200.0;
+/// A triangle in the cells where pairs meet: 24 bytes, more where parcels are small, a fifth of them
+/// in several cells.
+pub const CELL_TRIANGLE_BYTES: f64 = 60.0;
 /// A vertex under way takes so much of the proof's memory, growth included.
 pub const FAN_BYTES: f64 = 250.0;
 /// Lock, manifest, headers, and what file systems round up.
@@ -229,7 +232,8 @@ impl DiskModel<'_> {
         let hashes = spilled(HASH_BYTES * vertices, 0.0, share / 8.0);
         let scattered = FAN_BYTES * self.counts.open_vertices as f64 > share / 4.0;
         let tape = if scattered { tape * most.triangles as f64 } else { 0.0 };
-        positions + hashes + tape
+        let cells = spilled(CELL_TRIANGLE_BYTES * most.triangles as f64, 0.0, share / 20.0);
+        positions + hashes + tape + cells
     }
 }
 

@@ -13,9 +13,9 @@ use crate::verify::intersect::signs::{Point, Signs};
 #[cold]
 pub(crate) fn meet(signs: Signs, a: [Point; 3], b: [Point; 3], shared: usize) -> bool {
     match shared {
-        0 => [[0, 1], [1, 2], [2, 0]].iter().any(|&[i, j]| {
-            reaches(signs, [a[i], a[j]], b) || reaches(signs, [b[i], b[j]], a)
-        }),
+        0 => [[0, 1], [1, 2], [2, 0]]
+            .iter()
+            .any(|&[i, j]| reaches(signs, [a[i], a[j]], b) || reaches(signs, [b[i], b[j]], a)),
         1 => reaches(signs, [a[1], a[2]], b) || reaches(signs, [b[1], b[2]], a),
         2 => signs.side(a, b[2]) == 0 && folds_back(signs, a, b[2]),
         // The same triangle twice.

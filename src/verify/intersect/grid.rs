@@ -175,7 +175,8 @@ mod tests {
 
     #[test]
     fn keys_and_cells_are_one_to_one_and_nested() {
-        for cell in [[0, 0, 0], [1, 2, 3], [0x1f_ffff, 0, 0x15_5555], [77_777, 1 << 20, 0x1f_ffff]] {
+        for cell in [[0, 0, 0], [1, 2, 3], [0x1f_ffff, 0, 0x15_5555], [77_777, 1 << 20, 0x1f_ffff]]
+        {
             let key = key_of_cell(cell);
             assert_eq!(cell_of_key(key), cell);
             assert_eq!(key >> 15, key_of_cell(cell.map(|c| c >> 5)));

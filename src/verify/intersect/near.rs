@@ -5,21 +5,19 @@
 //!             the cell, once.
 //! Invariant:  the low corner of a pair's overlap lies in one part of any division into parts, and
 //!             the pair is told there.
-//! Memory:     lists of numbers: 3 per box and level of division at most.
+//! Memory:     lists of numbers: 3 per box and level of division at most. A level has at most 7 of 8
+//!             boxes of the one around it.
 
 /// Bits of a coordinate.
 pub(crate) const PLACE_BITS: u32 = 20;
 /// Above each of the three coordinates of a packed corner there is a bit to spare.
 const FIELD_BITS: u32 = PLACE_BITS + 1;
-const SPARE: u64 = 1 << PLACE_BITS | 1 << (PLACE_BITS + FIELD_BITS) | 1 << (PLACE_BITS + 2 * FIELD_BITS);
+const SPARE: u64 =
+    1 << PLACE_BITS | 1 << (PLACE_BITS + FIELD_BITS) | 1 << (PLACE_BITS + 2 * FIELD_BITS);
 const PLACE: u64 = (1 << PLACE_BITS) - 1;
 
 /// So few boxes are compared each with each.
 const FEW: usize = 40;
-/// Boxes that a part should get.
-const PART: usize = 12;
-/// Bits of the finest division at one time.
-const MOST_BITS: u32 = 5;
 
 /// Three coordinates in one word.
 #[inline]
@@ -60,11 +58,17 @@ impl NearBox {
 
 /// Shows the numbers of the parts that a box meets.
 #[inline]
-fn each_part(near: &NearBox, part: Part, shift: u32, sides: [u32; 3], mut visit: impl FnMut(usize)) {
+fn each_part(
+    near: &NearBox,
+    part: Part,
+    shifts: [u32; 3],
+    sides: [u32; 3],
+    mut visit: impl FnMut(usize),
+) {
     let range = |i: usize| {
         let first = unpack(near.low, i).max(part.low[i]) - part.low[i];
         let last = unpack(near.high, i).min(part.high[i]) - part.low[i];
-        (first >> shift)..=(last >> shift)
+        (first >> shifts[i])..=(last >> shifts[i])
     };
     let [xs, ys, zs] = [range(0), range(1), range(2)];
     for z in zs {
@@ -84,6 +88,7 @@ pub(crate) struct NearPairs {
     /// Lists of boxes, of a part behind the one that it is a part of.
     lists: Vec<u32>,
     compared: Vec<(u64, u64, u64)>,
+    hits: Vec<u32>,
 }
 
 /// A box of places.
@@ -91,6 +96,13 @@ pub(crate) struct NearPairs {
 struct Part {
     low: [u32; 3],
     high: [u32; 3],
+}
+
+impl Part {
+    /// How many parts of these widths, powers of two, it has along each axis.
+    fn sides(&self, shifts: [u32; 3]) -> [u32; 3] {
+        std::array::from_fn(|i| ((self.high[i] - self.low[i]) >> shifts[i]) + 1)
+    }
 }
 
 impl NearPairs {
@@ -108,14 +120,17 @@ impl NearPairs {
         if count <= FEW {
             return self.compare(from, part, visit);
         }
-        let Some((part, shift)) = self.division(from, part) else {
-            return self.compare(from, part, visit);
-        };
-        let sides: [u32; 3] =
-            std::array::from_fn(|i| ((part.high[i] - part.low[i]) >> shift) + 1);
+        let (part, mut shifts) = self.division(from, part);
         let end = self.lists.len();
-        let Some(ends) = self.distribute(from, part, shift, sides) else {
-            return self.compare(from, part, visit);
+        let (sides, ends) = loop {
+            let sides = part.sides(shifts);
+            if sides == [1; 3] {
+                return self.compare(from, part, visit);
+            }
+            if let Some(ends) = self.distribute(from, part, shifts, sides) {
+                break (sides, ends);
+            }
+            shifts = shifts.map(|shift| shift + 1);
         };
         // Parts are taken from the last on, so that each is the end of the lists.
         let mut cell = ends.len();
@@ -127,9 +142,9 @@ impl NearPairs {
                     let within = self.lists.len() - first;
                     if within > 1 {
                         let low: [u32; 3] =
-                            std::array::from_fn(|i| part.low[i] + ([x, y, z][i] << shift));
+                            std::array::from_fn(|i| part.low[i] + ([x, y, z][i] << shifts[i]));
                         let high = std::array::from_fn(|i| {
-                            (low[i] + ((1 << shift) - 1)).min(part.high[i])
+                            (low[i] + ((1 << shifts[i]) - 1)).min(part.high[i])
                         });
                         // Most of them at one place: dividing on would not part them.
                         if within * 8 > count * 7 {
@@ -144,34 +159,35 @@ impl NearPairs {
         }
     }
 
-    /// The part without its empty rim, and the width of its own parts as a power of two.
-    fn division(&self, from: usize, part: Part) -> Option<(Part, u32)> {
+    /// The part without its empty rim, and the widths of its own parts as powers of two.
+    fn division(&self, from: usize, part: Part) -> (Part, [u32; 3]) {
         let list = &self.lists[from..];
-        let (mut low, mut high) = (part.high, part.low);
-        let mut extents = 0_u64;
+        let mut tight = Part { low: part.high, high: part.low };
+        let mut extents = [0_u64; 3];
         for &number in list {
             let near = &self.boxes[number as usize];
-            let mut most = 0;
             for i in 0..3 {
                 let first = unpack(near.low, i).max(part.low[i]);
                 let last = unpack(near.high, i).min(part.high[i]);
-                low[i] = low[i].min(first);
-                high[i] = high[i].max(last);
-                most = most.max(last - first);
+                tight.low[i] = tight.low[i].min(first);
+                tight.high[i] = tight.high[i].max(last);
+                extents[i] += u64::from(last - first);
             }
-            extents += u64::from(most);
         }
-        let widest = (0..3).map(|i| high[i] - low[i]).max().unwrap_or(0);
-        if widest == 0 {
-            return None;
+        // A part is two to four times as wide as its boxes, and there are not more than boxes.
+        let mut shifts = extents.map(|extent| {
+            let mean = (extent / list.len() as u64) as u32;
+            u32::BITS - mean.leading_zeros() + 1
+        });
+        loop {
+            let sides = tight.sides(shifts);
+            let parts: u64 = sides.iter().map(|&side| u64::from(side)).product();
+            if parts <= list.len() as u64 {
+                return (tight, shifts);
+            }
+            let longest = (0..3).max_by_key(|&i| sides[i]).unwrap_or(0);
+            shifts[longest] += 1;
         }
-        // As many parts as a sheet would fill.
-        let bits = ((list.len() / PART).ilog2() + 1).div_ceil(2).clamp(1, MOST_BITS);
-        let shift = (u32::BITS - widest.leading_zeros()).saturating_sub(bits);
-        let mean = (extents / list.len() as u64) as u32;
-        let least = u32::BITS - mean.leading_zeros();
-        let shift = shift.max(least);
-        (widest >> shift > 0).then_some((Part { low, high }, shift))
     }
 
     /// Appends the lists of all parts; where each ends, counted from the first. `None` if that
@@ -180,7 +196,7 @@ impl NearPairs {
         &mut self,
         from: usize,
         part: Part,
-        shift: u32,
+        shifts: [u32; 3],
         sides: [u32; 3],
     ) -> Option<Vec<u32>> {
         let list = from..self.lists.len();
@@ -188,7 +204,7 @@ impl NearPairs {
         let mut copies = 0;
         for at in list.clone() {
             let near = &self.boxes[self.lists[at] as usize];
-            each_part(near, part, shift, sides, |cell| {
+            each_part(near, part, shifts, sides, |cell| {
                 ends[cell] += 1;
                 copies += 1;
             });
@@ -205,7 +221,7 @@ impl NearPairs {
         let (lists, parts) = self.lists.split_at_mut(list.end);
         // From the last box to the first, each part from its end to its start.
         for &number in lists[list].iter().rev() {
-            each_part(&self.boxes[number as usize], part, shift, sides, |cell| {
+            each_part(&self.boxes[number as usize], part, shifts, sides, |cell| {
                 ends[cell] -= 1;
                 parts[ends[cell] as usize] = number;
             });
@@ -220,7 +236,7 @@ impl NearPairs {
 
     /// Compares each box of the list with each.
     fn compare(&mut self, from: usize, part: Part, visit: &mut impl FnMut(u32, u32)) {
-        let Self { boxes, lists, compared } = self;
+        let Self { boxes, lists, compared, hits } = self;
         let list = &lists[from..];
         let origin = pack(part.low);
         compared.clear();
@@ -228,15 +244,19 @@ impl NearPairs {
             let NearBox { low, high, starts } = boxes[number as usize];
             (low, high | SPARE, starts & not_below(low, origin))
         }));
+        hits.resize(hits.len().max(list.len()), 0);
         for (at, &(low, high, starts)) in compared.iter().enumerate() {
-            for (step, &(other_low, other_high, other_starts)) in
-                compared[at + 1..].iter().enumerate()
+            // One hit in four or so is hard to foresee: without a branch the loop does not stall.
+            let mut count = 0;
+            let others = &list[at + 1..];
+            for (&(other_low, other_high, other_starts), &other) in
+                compared[at + 1..].iter().zip(others)
             {
                 let overlap = (high - other_low) & (other_high - low);
-                if overlap & (starts | other_starts) & SPARE == SPARE {
-                    visit(list[at], list[at + 1 + step]);
-                }
+                hits[count] = other;
+                count += usize::from(overlap & (starts | other_starts) & SPARE == SPARE);
             }
+            hits[..count].iter().for_each(|&other| visit(list[at], other));
         }
     }
 }

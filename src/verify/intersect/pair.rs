@@ -157,8 +157,7 @@ fn are_apart_at_vertex(p: [Point; 3], q: [Point; 3], axes: [usize; 2]) -> bool {
 #[inline]
 fn are_apart_in_sight(axis: usize, [a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
     let (ab, cd) = (turn(axis, a, b), turn(axis, c, d));
-    let [ac, ad, bc, bd] =
-        [turn(axis, a, c), turn(axis, a, d), turn(axis, b, c), turn(axis, b, d)];
+    let [ac, ad, bc, bd] = [turn(axis, a, c), turn(axis, a, d), turn(axis, b, c), turn(axis, b, d)];
     ab != 0 && (ac == -ab && ad == -ab || bc == ab && bd == ab)
         || cd != 0 && (ac == cd && bc == cd || ad == -cd && bd == -cd)
 }
@@ -184,6 +183,5 @@ fn are_apart(p: [Point; 3], q: [Point; 3], axes: [usize; 2]) -> bool {
         || on_one_side(q, p)
         || beyond_an_edge(axes[0], p, q)
         || beyond_an_edge(axes[0], q, p)
-        || axes[1] != axes[0]
-            && (beyond_an_edge(axes[1], p, q) || beyond_an_edge(axes[1], q, p))
+        || axes[1] != axes[0] && (beyond_an_edge(axes[1], p, q) || beyond_an_edge(axes[1], q, p))
 }

@@ -69,7 +69,8 @@ impl<'t> Reach<'t> {
     /// and those through an edge along an axis.
     fn may_meet(&self, grid: &Grid, range: &CellRange) -> bool {
         let (middle, half) = grid.middle(range);
-        let from_middle = self.corners.map(|p| -> Point { std::array::from_fn(|i| p[i] - middle[i]) });
+        let from_middle =
+            self.corners.map(|p| -> Point { std::array::from_fn(|i| p[i] - middle[i]) });
         let most: Point = std::array::from_fn(|i| {
             half[i] + middle[i].abs() + self.corners.iter().map(|p| p[i].abs()).fold(0.0, f64::max)
         });

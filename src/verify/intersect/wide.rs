@@ -109,7 +109,8 @@ fn differences<const N: usize, const M: usize>(
 ) -> [[Whole; N]; M] {
     let all = points.iter().flatten().chain(&origin);
     let unit = all.map(|&x| parts(x).1).min().unwrap_or(0);
-    points.map(|p| std::array::from_fn(|i| Whole::of(p[i], unit).minus(&Whole::of(origin[i], unit))))
+    points
+        .map(|p| std::array::from_fn(|i| Whole::of(p[i], unit).minus(&Whole::of(origin[i], unit))))
 }
 
 fn minor(a: &Whole, b: &Whole, c: &Whole, d: &Whole) -> Whole {
