@@ -170,11 +170,8 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
         .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
     let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };
-    let proof_options = ProofOptions {
-        share_bytes: 32 << 20,
-        outward: Outward::NotAsked,
-        intersections: false,
-    };
+    let proof_options =
+        ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked, intersections: false };
     let proof = prove(&mut open, &scratch, &proof_options, &pool, &Void).expect("room");
     Contoured { kept, proof, stats }
 }

@@ -263,13 +263,11 @@ impl Run<'_> {
             FillRule::Solid => Outward::AllPositive,
             FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
-        let proof_options = ProofOptions {
-            share_bytes: resources.share_bytes / 2,
-            outward,
-            intersections: true,
-        };
-        let proof = prove(&mut open, resources.scratch, &proof_options, resources.pool, &self.recording)
-            .map_err(RepairError::from_verify)?;
+        let proof_options =
+            ProofOptions { share_bytes: resources.share_bytes / 2, outward, intersections: true };
+        let proof =
+            prove(&mut open, resources.scratch, &proof_options, resources.pool, &self.recording)
+                .map_err(RepairError::from_verify)?;
         // Cavities face inward, and where two components share a cell they may cross: then nesting
         // does not tell which way one should face. That is for a person, see the reasons.
         let nested = self.settings.fill_rule == FillRule::Evenodd;

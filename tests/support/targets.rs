@@ -8,9 +8,7 @@ use brickmend::io::{BATCH_TRIANGLES, Format, ReadOptions};
 use brickmend::mesh::TriangleBatch;
 use brickmend::monitor::Void;
 use brickmend::octree::{decode_cells, decode_hits, decode_signs};
-use brickmend::repair::{
-    Depth, Limits, RepairError, Settings, is_about_intersections, repair,
-};
+use brickmend::repair::{Depth, Limits, RepairError, Settings, is_about_intersections, repair};
 use brickmend::store::{Scratch, load_manifest};
 use tempfile::TempDir;
 

@@ -166,12 +166,12 @@ impl NearPairs {
         let mut extents = [0_u64; 3];
         for &number in list {
             let near = &self.boxes[number as usize];
-            for i in 0..3 {
+            for (i, extent) in extents.iter_mut().enumerate() {
                 let first = unpack(near.low, i).max(part.low[i]);
                 let last = unpack(near.high, i).min(part.high[i]);
                 tight.low[i] = tight.low[i].min(first);
                 tight.high[i] = tight.high[i].max(last);
-                extents[i] += u64::from(last - first);
+                *extent += u64::from(last - first);
             }
         }
         // A part is two to four times as wide as its boxes, and there are not more than boxes.

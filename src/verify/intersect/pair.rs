@@ -35,25 +35,59 @@ impl Face {
     }
 }
 
+/// How corners of two triangles are the same.
+#[derive(Clone, Copy)]
+struct Match {
+    /// The corners of the first, those that are shared in front.
+    first: [u8; 3],
+    /// The corners of the second, those that are shared in front in the same order.
+    second: [u8; 3],
+    shared: u8,
+}
+
+/// By bits: whether corner `i` of the first and `j` of the second are the same, at `3 * i + j`.
+static MATCHES: [Match; 512] = {
+    let mut matches = [Match { first: [0, 1, 2], second: [0, 1, 2], shared: 0 }; 512];
+    let mut equal = 0;
+    while equal < 512 {
+        matches[equal] = match_of(equal);
+        equal += 1;
+    }
+    matches
+};
+
+const fn match_of(equal: usize) -> Match {
+    let mut found = Match { first: [0, 1, 2], second: [0, 1, 2], shared: 0 };
+    let mut i = 0;
+    while i < 3 {
+        let at = found.shared as usize;
+        let mut j = at;
+        while j < 3 {
+            if equal >> (3 * i + found.second[j] as usize) & 1 == 1 {
+                // Later corners of the first have not moved yet.
+                found.first.swap(at, i);
+                found.second.swap(at, j);
+                found.shared += 1;
+                break;
+            }
+            j += 1;
+        }
+        i += 1;
+    }
+    found
+}
+
 /// Whether two triangles intersect; `positions` are those of all vertices.
 #[inline]
 pub(crate) fn intersect(a: &Face, b: &Face, positions: &[Point]) -> bool {
-    let mut first = [0, 1, 2];
-    let mut second = [0, 1, 2];
-    let mut shared = 0;
-    for i in 0..3 {
-        for j in shared..3 {
-            if a.vertices[i] == b.vertices[second[j]] {
-                // Shared corners go to the front, in the same order in both.
-                first.swap(shared, i);
-                second.swap(shared, j);
-                shared += 1;
-                break;
-            }
-        }
-    }
-    let p = first.map(|i| positions[a.vertices[i] as usize]);
-    let q = second.map(|j| positions[b.vertices[j] as usize]);
+    // Which of the nine pairs of corners are the same vertex is hard to foresee: no branches here.
+    let same = |i: usize, j: usize| usize::from(a.vertices[i] == b.vertices[j]) << (3 * i + j);
+    let equal = same(0, 0) | same(0, 1) | same(0, 2) | same(1, 0) | same(1, 1) | same(1, 2);
+    let equal = equal | same(2, 0) | same(2, 1) | same(2, 2);
+    let Match { first, second, shared } = MATCHES[equal];
+    let p = first.map(|i| positions[a.vertices[usize::from(i)] as usize]);
+    let q = second.map(|j| positions[b.vertices[usize::from(j)] as usize]);
+    let shared = usize::from(shared);
     let signs = Signs { tame: a.tame && b.tame };
     if signs.tame {
         let axes = [usize::from(a.axis), usize::from(b.axis)];
