@@ -11,7 +11,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::store::{Record, Sorter, StoreError};
 use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
 use crate::verify::intersect::near::{NearBox, NearPairs, PLACE_BITS};
-use crate::verify::intersect::pair::{Face, intersect};
+use crate::verify::intersect::pair::{Face, Sharing, intersect};
 use crate::verify::intersect::parcels::{Parcel, Unpacked};
 use crate::verify::intersect::signs::{Point, is_tame};
 use crate::verify::places::Smallest;
@@ -89,6 +89,8 @@ pub(crate) type WidePairs = Mutex<Sorter<WidePair>>;
 
 /// Pairs that a worker keeps back before it hands them on.
 const MOST_KEPT: usize = 256;
+/// Pairs that wait until they are tested together.
+const MOST_QUEUED: usize = 512;
 
 /// What was found.
 pub(crate) struct Found {
@@ -122,6 +124,8 @@ pub(crate) struct Workbench {
     is_wide: Vec<bool>,
     places: Vec<u32>,
     begun: u64,
+    /// Pairs to be tested, by the number of corners that they share.
+    queues: [Vec<(u32, u32, Sharing)>; 4],
 }
 
 impl Workbench {
@@ -132,34 +136,34 @@ impl Workbench {
         } else {
             self.unpack(task, |_, _, position| -> PositionKey { key_of(position) })
         };
-        let mut found = Found::new();
-        found.triangles = if task.counts { self.begun } else { 0 };
         let crosses = task.border.is_some();
-        let Self { positions, faces, numbers, near, is_wide, .. } = self;
-        let mut kept = Vec::new();
-        let mut handed_on = Ok(());
+        let Self { positions, faces, numbers, near, is_wide, queues, begun, .. } = self;
+        let mut judge = Judge {
+            positions,
+            faces,
+            numbers,
+            is_wide,
+            found: Found::new(),
+            kept: Vec::new(),
+            wide,
+            failure: None,
+        };
         near.each(&mut |a, b| {
-            let [a, b] = [a as usize, b as usize];
-            if crosses && (a < border) == (b < border) {
+            if crosses && ((a as usize) < border) == ((b as usize) < border) {
                 return;
             }
-            if intersect(&faces[a], &faces[b], positions) {
-                let corners = [a, b].map(|at| faces[at].vertices.map(|v| positions[v as usize]));
-                let pair = [numbers[a].min(numbers[b]), numbers[a].max(numbers[b])];
-                let place = middle_of_overlap(corners);
-                if is_wide[a] || is_wide[b] {
-                    kept.push(WidePair { pair, place });
-                    if kept.len() == MOST_KEPT && handed_on.is_ok() {
-                        handed_on = hand_on(&mut kept, wide);
-                    }
-                } else {
-                    found.pairs += 1;
-                    found.places.offer(pair, place);
-                }
+            let sharing = Sharing::of(&faces[a as usize], &faces[b as usize]);
+            let queue = &mut queues[sharing.count()];
+            queue.push((a, b, sharing));
+            if queue.len() == MOST_QUEUED {
+                judge.judge(queue);
             }
         });
-        handed_on.and_then(|()| hand_on(&mut kept, wide))?;
-        Ok(found)
+        queues.iter_mut().for_each(|queue| judge.judge(queue));
+        judge.hand_on();
+        let Judge { mut found, failure, .. } = judge;
+        found.triangles = if task.counts { *begun } else { 0 };
+        failure.map_or(Ok(found), Err)
     }
 
     /// Lists the triangles, with one number for each vertex; how many lie before the border.
@@ -168,7 +172,7 @@ impl Workbench {
         task: &CellTask,
         name_of: impl Fn(&Unpacked<'_>, usize, Point) -> N,
     ) -> usize {
-        let Self { positions, tame, faces, numbers, near, is_wide, places, begun } = self;
+        let Self { positions, tame, faces, numbers, near, is_wide, places, begun, .. } = self;
         positions.clear();
         tame.clear();
         faces.clear();
@@ -227,12 +231,55 @@ impl Workbench {
     }
 }
 
-fn hand_on(kept: &mut Vec<WidePair>, wide: &WidePairs) -> Result<(), StoreError> {
-    // The sort does not care in which order they come, nor whether another worker failed.
-    let mut wide = wide.lock().unwrap_or_else(PoisonError::into_inner);
-    wide.extend(kept)?;
-    kept.clear();
-    Ok(())
+/// Tests pairs of a cell.
+struct Judge<'b> {
+    positions: &'b [Point],
+    faces: &'b [Face],
+    numbers: &'b [u64],
+    is_wide: &'b [bool],
+    found: Found,
+    kept: Vec<WidePair>,
+    wide: &'b WidePairs,
+    failure: Option<StoreError>,
+}
+
+impl Judge<'_> {
+    /// Tests the pairs of a queue and empties it. They all share the same number of corners, so
+    /// that the tests take the same way.
+    fn judge(&mut self, queue: &mut Vec<(u32, u32, Sharing)>) {
+        for (a, b, sharing) in queue.drain(..) {
+            let [a, b] = [a as usize, b as usize];
+            if intersect(sharing, &self.faces[a], &self.faces[b], self.positions) {
+                self.enter(a, b);
+            }
+        }
+    }
+
+    #[cold]
+    fn enter(&mut self, a: usize, b: usize) {
+        let corner = |vertex: u32| self.positions[vertex as usize];
+        let place = middle_of_overlap([a, b].map(|at| self.faces[at].vertices.map(corner)));
+        let numbers = [self.numbers[a], self.numbers[b]];
+        let pair = [numbers[0].min(numbers[1]), numbers[0].max(numbers[1])];
+        if self.is_wide[a] || self.is_wide[b] {
+            self.kept.push(WidePair { pair, place });
+            if self.kept.len() == MOST_KEPT {
+                self.hand_on();
+            }
+        } else {
+            self.found.pairs += 1;
+            self.found.places.offer(pair, place);
+        }
+    }
+
+    fn hand_on(&mut self) {
+        // The sort does not care in which order they come, nor whether another worker failed.
+        let mut wide = self.wide.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Err(error) = wide.extend(&self.kept) {
+            self.failure.get_or_insert(error);
+        }
+        self.kept.clear();
+    }
 }
 
 /// The middle of the overlap of two boxes, by which a pair is found again.

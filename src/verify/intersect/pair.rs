@@ -77,14 +77,31 @@ const fn match_of(equal: usize) -> Match {
     found
 }
 
+/// Which corners of two triangles are the same vertex.
+#[derive(Clone, Copy)]
+pub(crate) struct Sharing(u16);
+
+impl Sharing {
+    /// Of two triangles.
+    #[inline]
+    pub(crate) fn of(a: &Face, b: &Face) -> Self {
+        // This is hard to foresee: no branches here.
+        let same = |i: usize, j: usize| u16::from(a.vertices[i] == b.vertices[j]) << (3 * i + j);
+        let equal = same(0, 0) | same(0, 1) | same(0, 2) | same(1, 0) | same(1, 1) | same(1, 2);
+        Self(equal | same(2, 0) | same(2, 1) | same(2, 2))
+    }
+
+    /// How many corners.
+    #[inline]
+    pub(crate) fn count(self) -> usize {
+        usize::from(MATCHES[usize::from(self.0)].shared)
+    }
+}
+
 /// Whether two triangles intersect; `positions` are those of all vertices.
 #[inline]
-pub(crate) fn intersect(a: &Face, b: &Face, positions: &[Point]) -> bool {
-    // Which of the nine pairs of corners are the same vertex is hard to foresee: no branches here.
-    let same = |i: usize, j: usize| usize::from(a.vertices[i] == b.vertices[j]) << (3 * i + j);
-    let equal = same(0, 0) | same(0, 1) | same(0, 2) | same(1, 0) | same(1, 1) | same(1, 2);
-    let equal = equal | same(2, 0) | same(2, 1) | same(2, 2);
-    let Match { first, second, shared } = MATCHES[equal];
+pub(crate) fn intersect(sharing: Sharing, a: &Face, b: &Face, positions: &[Point]) -> bool {
+    let Match { first, second, shared } = MATCHES[usize::from(sharing.0)];
     let p = first.map(|i| positions[a.vertices[usize::from(i)] as usize]);
     let q = second.map(|j| positions[b.vertices[usize::from(j)] as usize]);
     let shared = usize::from(shared);

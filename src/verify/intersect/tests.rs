@@ -11,7 +11,7 @@ use crate::mesh::shapes::{Corners, ListedTriangles, Random, sphere};
 use crate::monitor::Void;
 use crate::store::Scratch;
 use crate::verify::intersect::exact_pair::meet;
-use crate::verify::intersect::pair::{Face, intersect};
+use crate::verify::intersect::pair::{Face, Sharing, intersect};
 use crate::verify::intersect::signs::{Point, Signs, is_tame};
 use crate::verify::positions::key_of;
 use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
@@ -111,7 +111,8 @@ fn by_filters_and_signs(points: &[Point], a: [u32; 3], b: [u32; 3]) -> bool {
         let corners = vertices.map(|v| points[v as usize]);
         Face::of(vertices, corners, corners.iter().all(is_tame))
     };
-    intersect(&face(a), &face(b), points)
+    let (a, b) = (face(a), face(b));
+    intersect(Sharing::of(&a, &b), &a, &b, points)
 }
 
 /// Some corners of two triangles: `shared` of them are the same.
