@@ -1,4 +1,5 @@
-//! The proof of a sphere of half a million triangles, with and without indices.
+//! The proof of a sphere of half a million triangles: with and without indices, with and without
+//! the search for intersections.
 
 use std::convert::Infallible;
 use std::hint::black_box;
@@ -83,21 +84,24 @@ fn proofs(criterion: &mut Criterion) {
     let scratch = Scratch::new(folder.path());
     let mut group = criterion.benchmark_group("proof");
     group.sample_size(10);
-    for (name, indexed, share_bytes) in [
-        ("indexed in memory", true, 1 << 30),
-        ("indexed in 8 MiB", true, 8 << 20),
-        ("positions in memory", false, 1 << 30),
-        ("positions in 8 MiB", false, 8 << 20),
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+    for (name, indexed, share_bytes, intersections) in [
+        ("indexed in memory", true, 1 << 30, true),
+        ("indexed in 8 MiB", true, 8 << 20, true),
+        ("positions in memory", false, 1 << 30, true),
+        ("positions in 8 MiB", false, 8 << 20, true),
+        ("indexed in memory without intersections", true, 1 << 30, false),
+        ("positions in memory without intersections", false, 1 << 30, false),
     ] {
         let sphere = Sphere::new(indexed);
         let triangles = sphere.batches.iter().map(TriangleBatch::len).sum::<usize>();
         group.throughput(Throughput::Elements(triangles as u64));
-        let options = ProofOptions { share_bytes, outward: Outward::AllPositive };
+        let options = ProofOptions { share_bytes, outward: Outward::AllPositive, intersections };
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 let show = || Box::new(Show { sphere: &sphere, next: 0 });
                 let mut open = || Ok(show() as ProvedSource<'_, Infallible>);
-                let proof = prove(&mut open, &scratch, &options, &Void);
+                let proof = prove(&mut open, &scratch, &options, &pool, &Void);
                 let proof = proof.expect("the scratch folder is writable");
                 assert!(proof.holds());
                 black_box(proof)

@@ -17,7 +17,7 @@ use brickmend::repair::{
 use tempfile::NamedTempFile;
 
 use support::disk_watch::DiskWatch;
-use support::run::{Encoding, Workshop, at_depth};
+use support::run::{Encoding, Workshop, at_depth, unclustered};
 use support::schema::check_document;
 use support::soups::closed_soups;
 use support::testdata;
@@ -93,7 +93,8 @@ fn disk_and_output_stay_below_their_bounds() {
 #[test]
 fn every_format_of_output_has_its_own_bound() {
     let input = testdata("models/bowl.obj");
-    let settings = at_depth(6);
+    // Bounds do not reckon with clusters.
+    let settings = unclustered(6);
     for name in ["out.obj", "out.stl", "out.ply", "out.off"] {
         let format = format_of_extension(Path::new(name)).expect("a known ending");
         let told = estimate(&input, format, &settings, &limits(BUDGETS[1]), &Void).expect("told");
@@ -275,7 +276,8 @@ fn the_documentation_names_every_field_and_no_other() {
     assert!(told.input.bounds != SnapBox::EMPTY);
     let check = |told: &Estimate| {
         let json = serde_json::to_value(told).expect("plain data is always JSON");
-        let conditional = ["settings.depth.levels", "settings.depth.tolerance"];
+        let conditional =
+            ["settings.depth.levels", "settings.depth.tolerance", "settings.decimate.length"];
         let lengths = ["model", "percent", "metres"]
             .map(|unit| format!("settings.depth.tolerance.length.{unit}"));
         let inner = ["settings.depth.tolerance.length", "settings.depth.tolerance.max_depth"];

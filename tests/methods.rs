@@ -9,7 +9,7 @@ use brickmend::sign::FillRule;
 use proptest::prelude::*;
 
 use crate::support::breakage::Breakage;
-use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
+use crate::support::run::{Encoding, Workshop, at_depth, repair_soup, unclustered};
 use crate::support::soups::{closed_soups, random_triangles};
 use crate::support::surface::Surface;
 
@@ -58,7 +58,7 @@ fn marching_cubes_cut_off_what_the_default_keeps_sharp() {
         surface.vertices.iter().for_each(|vertex| counts[planes(vertex)] += 1);
         counts
     };
-    let [off, flat, creases, corners] = on_planes(&at_depth(6));
+    let [off, flat, creases, corners] = on_planes(&unclustered(6));
     assert!(off == 0 && flat > 0 && creases > 0 && corners == 8);
     let [off, flat, creases, corners] = on_planes(&marching_cubes(6));
     assert!(flat > 0, "on the planes, to the bit");

@@ -10,7 +10,7 @@ use support::schema::check_document;
 use support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 18] = [
+const CONDITIONAL: [&str; 20] = [
     "input.dense_box.lo",
     "input.dense_box.hi",
     "settings.depth.tolerance",
@@ -20,6 +20,8 @@ const CONDITIONAL: [&str; 18] = [
     "settings.depth.tolerance.length.metres",
     "settings.depth.tolerance.max_depth",
     "settings.depth.levels",
+    "settings.decimate.cells",
+    "settings.decimate.length",
     "output.proof.places[].kind",
     "output.proof.places[].ends",
     "output.proof.places[].vertices",

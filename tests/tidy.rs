@@ -56,12 +56,12 @@ const HOMES: [(&str, &[&str]); 17] = [
             "store/checkpoint.rs",
             "store/brick/",
             "octree/brick.rs",
+            "octree/cell_brick.rs",
             "octree/edge_brick.rs",
             // These hand on the aligned bytes that `encode` returns.
             "scan/mod.rs",
             "sign/relabel.rs",
             "contour/mc/vertices.rs",
-            "contour/mdc/vertices.rs",
         ],
     ),
     ("std::env::", &["cli/"]),

@@ -186,8 +186,9 @@ pub fn contour_by(method: Method, field: &Field, backing: Backing, threads: usiz
         .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
     let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };
-    let proof_options = ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked };
-    let proof = prove(&mut open, &scratch, &proof_options, &Void).expect("room");
+    let proof_options =
+        ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked, intersections: true };
+    let proof = prove(&mut open, &scratch, &proof_options, &pool, &Void).expect("room");
     Contoured { kept, proof, stats }
 }
 
@@ -247,4 +248,25 @@ fn flipped_faces_occur_in_noise_and_are_needed() {
     let found = contour(&field, Backing::Memory, 1);
     assert_sound(&found, "all patched");
     assert!(found.stats.flipped_faces > 0 && found.stats.flipped_faces.is_multiple_of(2));
+}
+
+#[test]
+fn clusters_of_noise_are_sound_at_any_threshold() {
+    let mut clusters = 0;
+    for (seed, inside_share, patch_share, decimate_cells) in [
+        (11, 0.5, 0.5, 0.3),
+        (12, 0.2, 0.0, 0.7),
+        (13, 0.5, 0.0, 1.1),
+        (14, 0.05, 0.2, 2.0),
+        (15, 0.9, 1.0, 5.0),
+    ] {
+        let field = Field { seed, inside_share, patch_share, decimate_cells };
+        let found = contour(&field, Backing::Memory, 1);
+        assert_sound(&found, &format!("{inside_share} inside, {decimate_cells} cells"));
+        clusters += found.stats.clusters;
+        let other = contour(&field, Backing::Mapped, 4);
+        assert!(found.kept.vertices == other.kept.vertices, "{seed}");
+        assert!(found.kept.triangles == other.kept.triangles, "{seed}");
+    }
+    assert!(clusters > 1000, "{clusters}");
 }

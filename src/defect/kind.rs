@@ -23,11 +23,13 @@ pub enum DefectKind {
     CoincidentVertices,
     /// A closed surface that is inside out.
     InwardComponent,
+    /// Two triangles that go through each other or touch.
+    IntersectingTriangles,
 }
 
 impl DefectKind {
     /// All kinds, in order.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 9] = [
         Self::NonfiniteTriangle,
         Self::BoundaryEdge,
         Self::NonmanifoldEdge,
@@ -36,6 +38,7 @@ impl DefectKind {
         Self::DegenerateTriangle,
         Self::CoincidentVertices,
         Self::InwardComponent,
+        Self::IntersectingTriangles,
     ];
 
     /// What `count` of them are called in a sentence.
@@ -59,6 +62,8 @@ impl DefectKind {
             Self::CoincidentVertices => "vertices in the place of others",
             Self::InwardComponent if one => "component oriented inward",
             Self::InwardComponent => "components oriented inward",
+            Self::IntersectingTriangles if one => "pair of intersecting triangles",
+            Self::IntersectingTriangles => "pairs of intersecting triangles",
         }
     }
 }

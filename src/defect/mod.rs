@@ -7,6 +7,7 @@ mod boundary_edge;
 mod coincident_vertices;
 mod degenerate_triangle;
 mod inconsistent_edge;
+mod intersecting_triangles;
 mod inward_component;
 mod kind;
 mod nonfinite_triangle;
@@ -18,6 +19,7 @@ pub use boundary_edge::BoundaryEdge;
 pub use coincident_vertices::CoincidentVertices;
 pub use degenerate_triangle::DegenerateTriangle;
 pub use inconsistent_edge::InconsistentEdge;
+pub use intersecting_triangles::IntersectingTriangles;
 pub use inward_component::InwardComponent;
 pub use kind::DefectKind;
 pub use nonfinite_triangle::NonfiniteTriangle;
@@ -50,6 +52,8 @@ pub enum Defect {
     CoincidentVertices(CoincidentVertices),
     /// A closed surface that is inside out.
     InwardComponent(InwardComponent),
+    /// Two triangles that go through each other or touch.
+    IntersectingTriangles(IntersectingTriangles),
 }
 
 impl Defect {
@@ -65,6 +69,7 @@ impl Defect {
             Self::DegenerateTriangle(_) => DefectKind::DegenerateTriangle,
             Self::CoincidentVertices(_) => DefectKind::CoincidentVertices,
             Self::InwardComponent(_) => DefectKind::InwardComponent,
+            Self::IntersectingTriangles(_) => DefectKind::IntersectingTriangles,
         }
     }
 
@@ -80,6 +85,7 @@ impl Defect {
             Self::DegenerateTriangle(triangle) => Some(triangle.corners[0]),
             Self::CoincidentVertices(pair) => Some(pair.position),
             Self::InwardComponent(component) => Some(component.position),
+            Self::IntersectingTriangles(pair) => Some(pair.position),
         }
     }
 }
@@ -95,6 +101,7 @@ impl fmt::Display for Defect {
             Self::DegenerateTriangle(defect) => defect.fmt(f),
             Self::CoincidentVertices(defect) => defect.fmt(f),
             Self::InwardComponent(defect) => defect.fmt(f),
+            Self::IntersectingTriangles(defect) => defect.fmt(f),
         }
     }
 }

@@ -175,8 +175,11 @@ impl ArchiveSize for SignBrick {
     }
 }
 
+/// The bytes of an archive, aligned as it asks.
+pub type RecordBytes = AlignedVec;
+
 /// The archive of a brick.
-pub fn encode<B>(brick: &B) -> AlignedVec
+pub fn encode<B>(brick: &B) -> RecordBytes
 where
     B: ArchiveSize + for<'a> Serialize<BrickSerializer<'a>>,
 {

@@ -58,6 +58,14 @@ impl ArchiveSize for CellBrick {
     }
 }
 
+impl ArchivedCellBrick {
+    /// The brick that the archive holds.
+    #[must_use]
+    pub fn to_brick(&self) -> CellBrick {
+        rkyv::deserialize::<CellBrick, BoxedError>(self).expect("plain vectors deserialise")
+    }
+}
+
 /// Validates a [`CellBrick`].
 ///
 /// # Errors

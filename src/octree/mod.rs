@@ -16,7 +16,8 @@ mod triangle;
 
 pub use brick::{
     ArchiveSize, ArchivedHitBrick, ArchivedSignBrick, BrickError, Crossing, HitBrick, HitEdge,
-    MAX_HITS, NO_PLANE, PATCH, SignBrick, SourcePlane, decode_hits, decode_signs, encode,
+    MAX_HITS, NO_PLANE, PATCH, RecordBytes, SignBrick, SourcePlane, decode_hits, decode_signs,
+    encode,
 };
 pub use cell_brick::{ArchivedCellBrick, CellBrick, FacePoint, MAX_LEVEL, decode_cells};
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};

@@ -2,7 +2,6 @@
 
 use std::collections::BTreeMap;
 
-use crate::defect::DefectKind;
 use crate::monitor::{Counter, Gauge, Monitor};
 use crate::repair::outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
@@ -12,8 +11,7 @@ use crate::repair::run::Run;
 use crate::repair::settings::Depth;
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
-use crate::sign::FillRule;
-use crate::verify::{Failure, Proof};
+use crate::verify::Proof;
 
 /// Losing more than this share of the area is worth a look.
 const LOST_AREA_SHARE: f64 = 0.2;
@@ -40,7 +38,7 @@ pub fn conclude(
     };
     let dropped = dropped(&findings);
     let area_ratio = proof.area / findings.measure.area;
-    let broken = broken_promises(&proof, run.settings.fill_rule);
+    let broken = broken_promises(&proof);
     let mut reasons = reasons(run, &findings, &invented, &dropped, area_ratio, &proof);
     let verdict = judge(&broken, &mut reasons);
     run.recording.gauge(Gauge::GrantedBytes, run.accountant.peak_bytes());
@@ -105,20 +103,9 @@ fn judge(broken: &[String], reasons: &mut Vec<String>) -> Verdict {
     if reasons.is_empty() { Verdict::Pass } else { Verdict::Review }
 }
 
-/// Why a proof does not hold, but for nesting where the fill rule leaves that open.
-pub fn broken_promises(proof: &Proof, rule: FillRule) -> Vec<String> {
-    let nested = rule == FillRule::Evenodd;
-    let failures = proof.failures();
-    let broken = failures.iter().filter(|failure| !(nested && is_about_nesting(failure)));
-    broken.map(ToString::to_string).collect()
-}
-
-/// Whether a failure is about which way a component faces, and nothing else.
-fn is_about_nesting(failure: &Failure) -> bool {
-    matches!(
-        failure,
-        Failure::Defects(DefectKind::InwardComponent, _) | Failure::UndecidedComponents(_)
-    )
+/// Why a proof does not hold.
+pub fn broken_promises(proof: &Proof) -> Vec<String> {
+    proof.failures().iter().map(ToString::to_string).collect()
 }
 
 fn dropped(findings: &Findings) -> Dropped {
@@ -202,21 +189,20 @@ mod tests {
     fn a_surface_that_is_not_sound_fails_whatever_else_there_is_to_look_at() {
         let sound = Proof { triangles: 4, ..Proof::default() };
         let pinched = Proof { nonmanifold_edges: 2, ..sound.clone() };
-        let broken = broken_promises(&pinched, FillRule::Solid);
+        let broken = broken_promises(&pinched);
         let mut reasons = vec!["Much area is gone".to_owned()];
         assert_eq!(judge(&broken, &mut reasons), Verdict::Fail);
         assert_eq!(reasons[0], "The output is not sound: 2 non-manifold edges");
-        let broken = broken_promises(&sound, FillRule::Solid);
+        let broken = broken_promises(&sound);
         assert_eq!(judge(&broken, &mut reasons[1..].to_vec()), Verdict::Review);
         assert_eq!(judge(&broken, &mut Vec::new()), Verdict::Pass);
     }
 
     #[test]
-    fn nesting_is_a_promise_of_the_solid_fill_rule_only() {
+    fn every_failure_is_a_broken_promise() {
         let nested = Proof { triangles: 8, inward_components: 1, ..Proof::default() };
-        assert_eq!(broken_promises(&nested, FillRule::Solid).len(), 1);
-        assert!(broken_promises(&nested, FillRule::Evenodd).is_empty());
+        assert_eq!(broken_promises(&nested).len(), 1);
         let open = Proof { boundary_edges: 3, ..nested };
-        assert_eq!(broken_promises(&open, FillRule::Evenodd), ["3 boundary edges"]);
+        assert_eq!(broken_promises(&open)[0], "3 boundary edges");
     }
 }

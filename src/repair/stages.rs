@@ -124,7 +124,8 @@ impl Run<'_> {
             Step::Place => findings.sign.bricks,
             Step::Separate => 0,
             Step::Write => 2 * findings.sign.bricks,
-            Step::Prove => findings.written.triangles,
+            // Read once, and joined once.
+            Step::Prove => 2 * findings.written.triangles,
         }
     }
 
@@ -302,13 +303,13 @@ impl Run<'_> {
             FillRule::Solid => Outward::AllPositive,
             FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
-        let proof_options = ProofOptions { share_bytes: resources.share_bytes / 2, outward };
-        let proof = prove(&mut open, resources.scratch, &proof_options, &self.recording)
-            .map_err(RepairError::from_verify)?;
-        // Cavities face inward, and where two components share a cell they may cross: then nesting
-        // does not tell which way one should face. That is for a person, see the reasons.
-        // What other methods do not promise is no bug either: the outcome tells it.
-        let failures = broken_promises(&proof, self.settings.fill_rule);
+        let proof_options =
+            ProofOptions { share_bytes: resources.share_bytes / 2, outward, intersections: true };
+        let proof =
+            prove(&mut open, resources.scratch, &proof_options, resources.pool, &self.recording)
+                .map_err(RepairError::from_verify)?;
+        // What other methods do not promise is no bug: the outcome tells it.
+        let failures = broken_promises(&proof);
         if failures.is_empty() || self.settings.method.caveat().is_some() {
             findings.proof = Some(proof);
             return Ok(Vec::new());

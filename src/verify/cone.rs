@@ -48,7 +48,7 @@ pub(crate) struct Cone {
     pub(crate) magnitude: f64,
     /// The square of twice the triangle's area.
     pub(crate) square: f64,
-    /// Whether the triangle has an area beyond all doubt of rounding.
+    /// Whether the triangle has an area; from [`Cone::of`] beyond all doubt of rounding.
     pub(crate) has_area: bool,
 }
 

@@ -3,14 +3,13 @@
 //! In:         a [`MeshSource`], read to its end.
 //! Out:        the tape with corners, and with vertex numbers in formats that have them.
 //! Invariant:  the degeneracy test is exact: a f64 filter with an error bound, then exact signs.
-//! Source:     Shewchuk 1997 (adaptive precision), for the filter's bound and for orient2d.
-
-use robust::{Coord, orient2d};
+//! Source:     Shewchuk 1997 (adaptive precision), for the filter's bound and exact signs.
 
 use crate::defect::{Defect, DegenerateTriangle, NonfiniteTriangle};
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::verify::cone::{Compensated, Cone};
+use crate::verify::intersect::{Intersections, Signs, is_tame};
 use crate::verify::places::MOST_PLACES;
 use crate::verify::tape::{Tape, is_whole, stop_if_asked};
 use crate::verify::{Proof, VerifyError};
@@ -43,6 +42,7 @@ pub(crate) fn is_finite(corners: &[[f64; 3]; 3]) -> bool {
 pub(crate) fn read<S: MeshSource + ?Sized>(
     source: &mut S,
     tape: &mut Tape,
+    mut intersections: Option<&mut Intersections<'_>>,
     monitor: &dyn Monitor,
 ) -> Result<Intake, VerifyError<S::Error>> {
     let mut intake = Intake::default();
@@ -51,7 +51,12 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
         stop_if_asked(monitor)?;
         for (at, corners) in batch.corners.iter().enumerate() {
             let ids = batch.indices.get(at).copied();
-            let is_finite = intake.add(corners, ids).is_some();
+            let number = intake.triangles;
+            let cone = intake.add(corners, ids);
+            if let (Some(found), true) = (&mut intersections, cone.is_some_and(|c| c.has_area)) {
+                found.add(number, ids, corners)?;
+            }
+            let is_finite = cone.is_some();
             tape.push_corners(*corners)?;
             if let Some(ids) = ids {
                 tape.push_ids(if is_finite { ids } else { [0; 3] })?;
@@ -64,7 +69,8 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
 }
 
 impl Intake {
-    /// Counts a triangle; `None` if it has a corner at infinity.
+    /// Counts a triangle; `None` if it has a corner at infinity. Its cone has an area if and only if
+    /// it has one exactly.
     #[inline]
     pub(crate) fn add(&mut self, corners: &[[f64; 3]; 3], ids: Option<[u32; 3]>) -> Option<Cone> {
         let triangle = self.triangles;
@@ -86,10 +92,11 @@ impl Intake {
             [corners[0]; 2]
         });
         widen(low, high, corners);
-        let cone = Cone::of(corners, self.origin);
+        let mut cone = Cone::of(corners, self.origin);
+        cone.has_area = cone.has_area || !is_flat(corners);
         self.area.add(cone.square.sqrt());
         self.volume.add(cone.volume);
-        if ids.is_some_and(|ids| !is_whole(ids)) || (!cone.has_area && is_flat(corners)) {
+        if ids.is_some_and(|ids| !is_whole(ids)) || !cone.has_area {
             self.degenerate += 1;
             if self.degenerate_places.len() < MOST_PLACES {
                 let defect = DegenerateTriangle { triangle, corners: *corners };
@@ -134,9 +141,6 @@ fn widen(low: &mut [f64; 3], high: &mut [f64; 3], corners: &[[f64; 3]; 3]) {
 /// Whether the corners lie on one line, exactly.
 #[cold]
 fn is_flat(&[a, b, c]: &[[f64; 3]; 3]) -> bool {
-    let flat = |u: usize, v: usize| {
-        let at = |p: [f64; 3]| Coord { x: p[u], y: p[v] };
-        orient2d(at(a), at(b), at(c)) == 0.0
-    };
-    flat(0, 1) && flat(1, 2) && flat(2, 0)
+    let signs = Signs { tame: [a, b, c].iter().all(is_tame) };
+    (0..3).all(|axis| signs.turn(axis, a, b, c) == 0)
 }

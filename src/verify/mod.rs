@@ -1,4 +1,5 @@
-//! The proof: whether a file is closed, 2-manifold, oriented outward and free of degenerates.
+//! The proof: whether a file is closed, 2-manifold, oriented outward, free of degenerates and of
+//! intersections.
 //!
 //! In:         a [`MeshSource`]: read once if all is well, else once more to tell what is not.
 //! Out:        a [`Proof`]: exact counts, a few places of each defect, volume and area.
@@ -22,6 +23,7 @@ mod crowd;
 mod exact;
 mod fans;
 mod intake;
+mod intersect;
 mod link;
 mod nesting;
 mod numbering;
@@ -41,9 +43,13 @@ pub use proof::{Failure, Proof};
 
 use std::error::Error;
 
+use rayon::ThreadPool;
+
+use crate::defect::{Defect, IntersectingTriangles};
 use crate::mesh::MeshSource;
 use crate::monitor::{Monitor, Stage};
 use crate::store::{Scratch, StoreError};
+use crate::verify::intersect::Intersections;
 use crate::verify::prover::Prover;
 use crate::verify::stream::prove_sound;
 
@@ -65,6 +71,8 @@ pub struct ProofOptions {
     pub share_bytes: u64,
     /// What orientation is asked.
     pub outward: Outward,
+    /// Whether pairs of triangles that intersect are asked.
+    pub intersections: bool,
 }
 
 /// What can go wrong while proving.
@@ -93,18 +101,50 @@ pub fn prove<'s, E: Error + Send>(
     open: &mut dyn FnMut() -> Result<ProvedSource<'s, E>, E>,
     scratch: &Scratch,
     options: &ProofOptions,
+    pool: &ThreadPool,
     monitor: &dyn Monitor,
 ) -> Result<Proof, VerifyError<E>> {
     monitor.begin(Stage::Verify, 0);
     let mut start = || open().map_err(|source| VerifyError::Source { source });
-    let proof = match prove_sound(&mut *start()?, scratch, options, monitor)? {
-        Some(proof) => proof,
+    let asked = || {
+        let wanted = options.intersections;
+        wanted.then(|| Intersections::new(scratch, options.share_bytes, pool))
+    };
+    let mut intersections = asked();
+    let sound = prove_sound(&mut *start()?, scratch, options, intersections.as_mut(), monitor)?;
+    let proof = match sound {
+        Some(mut proof) => {
+            enter_intersections(intersections, &mut proof, pool, monitor)?;
+            proof
+        }
         None => {
+            drop(intersections);
+            let mut intersections = asked();
             let mut prover = Prover::new(scratch, options, monitor);
-            prover.read(&mut *start()?)?;
-            prover.judge()?
+            prover.read(&mut *start()?, intersections.as_mut())?;
+            let mut found = Proof::default();
+            enter_intersections(intersections, &mut found, pool, monitor)?;
+            let mut proof = prover.judge()?;
+            proof.intersecting_pairs = found.intersecting_pairs;
+            proof.places.append(&mut found.places);
+            proof
         }
     };
     monitor.end(Stage::Verify);
     Ok(proof)
+}
+
+fn enter_intersections(
+    intersections: Option<Intersections<'_>>,
+    proof: &mut Proof,
+    pool: &ThreadPool,
+    monitor: &dyn Monitor,
+) -> Result<(), StoreError> {
+    let Some(intersections) = intersections else { return Ok(()) };
+    let found = intersections.join(pool, monitor)?;
+    proof.intersecting_pairs = found.pairs;
+    proof.places.extend(found.places.iter().map(|&(triangles, position)| {
+        Defect::IntersectingTriangles(IntersectingTriangles { triangles, position })
+    }));
+    Ok(())
 }

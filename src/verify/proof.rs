@@ -45,6 +45,9 @@ pub struct Proof {
     /// Closed components for which that could not be decided: their coordinates differ by more
     /// than sixty decimal places, or they touch another one where nesting is asked.
     pub undecided_components: u64,
+    /// Pairs of triangles with an area that meet anywhere but in vertices and edges that they
+    /// share; touching counts. 0 when not asked.
+    pub intersecting_pairs: u64,
     /// Signed volume in cubed model units, rounded; means nothing unless closed.
     pub volume: f64,
     /// Area in squared model units, rounded.
@@ -98,6 +101,7 @@ impl Proof {
             DefectKind::DegenerateTriangle => self.degenerate_triangles,
             DefectKind::CoincidentVertices => self.coincident_vertices,
             DefectKind::InwardComponent => self.inward_components,
+            DefectKind::IntersectingTriangles => self.intersecting_pairs,
         }
     }
 

@@ -11,6 +11,7 @@ use crate::verify::coincidence::find_coincident;
 use crate::verify::components::{Component, Measure, OPEN, UNDECIDED, each_block, unite};
 use crate::verify::fans::judge_fans;
 use crate::verify::intake::{Intake, read};
+use crate::verify::intersect::Intersections;
 use crate::verify::link::Judgement;
 use crate::verify::nesting::{Nesting, nest};
 use crate::verify::numbering::number_positions;
@@ -50,12 +51,13 @@ impl<'p> Prover<'p> {
         }
     }
 
-    /// Reads the file onto the tape.
+    /// Reads the file onto the tape, and into the cells where pairs of triangles meet.
     pub(crate) fn read<S: MeshSource + ?Sized>(
         &mut self,
         source: &mut S,
+        intersections: Option<&mut Intersections<'_>>,
     ) -> Result<(), VerifyError<S::Error>> {
-        self.intake = read(source, &mut self.tape, self.monitor)?;
+        self.intake = read(source, &mut self.tape, intersections, self.monitor)?;
         Ok(())
     }
 

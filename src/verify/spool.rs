@@ -41,6 +41,21 @@ impl<R: Pod> Spool<R> {
         Ok(())
     }
 
+    /// Appends records.
+    pub(crate) fn extend(&mut self, records: &[R]) -> Result<(), StoreError> {
+        let mut left = records;
+        while !left.is_empty() {
+            if self.resident.len() == self.resident.capacity() {
+                self.make_room()?;
+            }
+            let room = self.resident.capacity() - self.resident.len();
+            let (now, later) = left.split_at(room.min(left.len()));
+            self.resident.extend_from_slice(now);
+            left = later;
+        }
+        Ok(())
+    }
+
     fn make_room(&mut self) -> Result<(), StoreError> {
         let bytes = if self.file.is_some() { self.block_bytes() } else { self.share_bytes };
         let most = bytes / size_of::<R>();

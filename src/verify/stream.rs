@@ -10,6 +10,7 @@ use crate::mesh::{MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::store::{Scratch, StoreError};
 use crate::verify::intake::Intake;
+use crate::verify::intersect::Intersections;
 use crate::verify::positions::{PositionKey, key_of};
 use crate::verify::slots::Name;
 use crate::verify::tape::stop_if_asked;
@@ -30,6 +31,7 @@ pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
     source: &mut S,
     scratch: &Scratch,
     options: &ProofOptions,
+    mut intersections: Option<&mut Intersections<'_>>,
     monitor: &dyn Monitor,
 ) -> Result<Option<Proof>, VerifyError<S::Error>> {
     let mut intake = Intake::default();
@@ -44,14 +46,15 @@ pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
                 Windows::Numbers(Window::new(scratch, options.share_bytes))
             }
         });
+        let pairs = intersections.as_deref_mut();
         let goes_on = match windows {
             Windows::Numbers(window) => {
                 let numbers = batch.indices.iter().copied();
-                take(&mut intake, window, &batch, numbers, |number, _| number)?
+                take(&mut intake, window, pairs, &batch, numbers, |number, _| number)?
             }
             Windows::Positions(window) => {
                 let keys = batch.corners.iter().map(|corners| corners.map(key_of));
-                take(&mut intake, window, &batch, keys, |_, arrival| arrival as u32)?
+                take(&mut intake, window, pairs, &batch, keys, |_, arrival| arrival as u32)?
             }
         };
         if !goes_on {
@@ -72,6 +75,7 @@ pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
 fn take<N: Name>(
     intake: &mut Intake,
     window: &mut Window<N>,
+    mut intersections: Option<&mut Intersections<'_>>,
     batch: &TriangleBatch,
     names: impl Iterator<Item = [N; 3]>,
     number: impl Fn(N, u64) -> u32,
@@ -79,9 +83,13 @@ fn take<N: Name>(
     for (at, (corners, names)) in batch.corners.iter().zip(names).enumerate() {
         let [a, b, c] = names;
         let is_whole = a != b && b != c && c != a;
-        let Some(cone) = intake.add(corners, batch.indices.get(at).copied()) else {
+        let (triangle, ids) = (intake.triangles, batch.indices.get(at).copied());
+        let Some(cone) = intake.add(corners, ids) else {
             return Ok(false);
         };
+        if let (Some(intersections), true) = (&mut intersections, cone.has_area) {
+            intersections.add(triangle, ids, corners)?;
+        }
         if !is_whole || !window.add(names, corners, &cone, &number)? {
             return Ok(false);
         }

@@ -4,6 +4,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use proptest::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuilder};
 
 use crate::defect::DefectKind;
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
@@ -117,12 +118,17 @@ impl MeshSource for Memory<'_> {
     }
 }
 
+fn pool(threads: usize) -> ThreadPool {
+    ThreadPoolBuilder::new().num_threads(threads).build().expect("threads")
+}
+
 fn proof(solid: &Solid, indexed: bool, outward: Outward, share_bytes: u64) -> (Proof, u64) {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
     let mut open = || Ok(Box::new(Memory { solid, indexed, next: 0 }) as ProvedSource<'_, _>);
-    let options = ProofOptions { share_bytes, outward };
-    let proof = prove(&mut open, &scratch, &options, &Void).expect("nothing fails in memory");
+    let options = ProofOptions { share_bytes, outward, intersections: false };
+    let proof =
+        prove(&mut open, &scratch, &options, &pool(1), &Void).expect("nothing fails in memory");
     (proof, scratch.written_bytes())
 }
 
@@ -324,19 +330,21 @@ fn a_sound_surface_has_the_same_proof_in_one_pass_and_from_the_tape() {
     many.triangles.sort_unstable_by_key(|t| t.map(|id| id.wrapping_mul(0x9E37_79B9)));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
-    let options = ProofOptions { share_bytes: 8 << 20, outward: Outward::AllPositive };
+    let options =
+        ProofOptions { share_bytes: 8 << 20, outward: Outward::AllPositive, intersections: false };
     for indexed in [true, false] {
         let source = || Memory { solid: &many, indexed, next: 0 };
-        let at_once = prove_sound(&mut source(), &scratch, &options, &Void).expect("no failure");
+        let at_once =
+            prove_sound(&mut source(), &scratch, &options, None, &Void).expect("no failure");
         let mut prover = Prover::new(&scratch, &options, &Void);
-        prover.read(&mut source()).expect("no failure");
+        prover.read(&mut source(), None).expect("no failure");
         let taped = prover.judge().expect("no failure");
         assert_eq!(taped.components, 4);
         assert_eq!(at_once, Some(taped));
     }
     let tight = ProofOptions { share_bytes: 64 << 10, ..options };
     let mut source = Memory { solid: &many, indexed: true, next: 0 };
-    assert_eq!(prove_sound(&mut source, &scratch, &tight, &Void).expect("no failure"), None);
+    assert_eq!(prove_sound(&mut source, &scratch, &tight, None, &Void).expect("no failure"), None);
 }
 
 #[test]
@@ -351,8 +359,9 @@ fn a_request_to_stop_is_heard() {
     let solid = unit_cube();
     let source = || Box::new(Memory { solid: &solid, indexed: true, next: 0 });
     let mut open = || Ok(source() as ProvedSource<'_, _>);
-    let options = ProofOptions { share_bytes: 1 << 20, outward: Outward::NotAsked };
-    let answer = prove(&mut open, &Scratch::new(folder.path()), &options, &Impatient);
+    let options =
+        ProofOptions { share_bytes: 1 << 20, outward: Outward::NotAsked, intersections: true };
+    let answer = prove(&mut open, &Scratch::new(folder.path()), &options, &pool(1), &Impatient);
     assert!(matches!(
         answer,
         Err(crate::verify::VerifyError::Store(crate::store::StoreError::Cancelled))

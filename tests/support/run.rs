@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use brickmend::io::{Format, format_of_extension};
 use brickmend::mesh::shapes::Corners;
 use brickmend::monitor::Void;
-use brickmend::repair::{Depth, Limits, Outcome, RepairError, Settings, repair};
+use brickmend::repair::{Depth, Limits, Outcome, Reach, RepairError, Settings, repair};
 use brickmend::sign::FillRule;
 use tempfile::TempDir;
 
@@ -37,6 +37,11 @@ pub struct Repaired {
 /// Settings with a fixed depth.
 pub fn at_depth(depth: u32) -> Settings {
     Settings { depth: Depth::Levels(depth), ..Settings::default() }
+}
+
+/// As [`at_depth`], with a vertex for every cell that the surface passes.
+pub fn unclustered(depth: u32) -> Settings {
+    Settings { decimate: Reach::Cells(0.0), ..at_depth(depth) }
 }
 
 /// Repairs a soup from OBJ to PLY and checks every guarantee on the written file.

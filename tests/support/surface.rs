@@ -31,12 +31,13 @@ impl Surface {
             FillRule::Solid => Outward::AllPositive,
             FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
-        let options = ProofOptions { share_bytes: 16 << 20, outward };
+        let options = ProofOptions { share_bytes: 16 << 20, outward, intersections: true };
         let read = ReadOptions { share_bytes: 16 << 20 };
         let mut open = || -> Result<ProvedSource<_>, brickmend::io::IoError> {
             brickmend::io::open(path, &scratch, &read)
         };
-        let proof = prove(&mut open, &scratch, &options, &Void).expect("a readable file");
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a pool");
+        let proof = prove(&mut open, &scratch, &options, &pool, &Void).expect("a readable file");
         assert!(proof.holds(), "{:?}", proof.failures());
         let mut source = brickmend::io::open(path, &scratch, &read).expect("a readable file");
         let mut surface = Self { vertices: Vec::new(), triangles: Vec::new(), proof };

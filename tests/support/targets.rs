@@ -141,7 +141,10 @@ pub fn repair_soup(bytes: &[u8]) {
     let settings = Settings { depth: Depth::Levels(5), ..Settings::default() };
     let limits = Limits { max_memory_bytes: 64 << 20, ..Limits::default() };
     match repair(&input, &output, Format::Ply, &settings, &limits, &Void) {
-        Ok(outcome) => assert!(outcome.output.proof.holds()),
+        Ok(outcome) => {
+            let proof = &outcome.output.proof;
+            assert!(proof.holds(), "{:?}", proof.failures());
+        }
         Err(RepairError::NoTriangle { .. } | RepairError::EmptyResult { .. }) => {}
         Err(RepairError::Input(error)) => assert!(error.is_input(), "{error}"),
         Err(error) => panic!("{error}"),

@@ -180,6 +180,12 @@ pub fn edge_in_cell(axis: usize, lower: [i32; 3], at: [i32; 3]) -> u8 {
     edge_at_corner(corner, axis as u8)
 }
 
+/// The edges of a mask of edges.
+#[cfg(test)]
+pub fn edges_of_mask(edges: u16) -> impl Iterator<Item = u8> {
+    (0..12).filter(move |edge| edges >> edge & 1 == 1)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

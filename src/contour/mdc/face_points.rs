@@ -10,8 +10,6 @@
 //! Fails:      [`ContourError`].
 //! Source:     Ju and Udeshi 2006 (face vertices).
 
-use rkyv::rancor::BoxedError;
-
 use crate::contour::mdc::arcs::{Arc, Edge, edges_of};
 use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
 use crate::contour::mdc::layers::Layers;
@@ -19,7 +17,7 @@ use crate::contour::mdc::neighbourhood::Neighbourhood;
 use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, flags_of};
 use crate::contour::{ContourError, ContourStats, SURFACE};
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{CellBrick, Domain, FacePoint, encode};
+use crate::octree::{Domain, FacePoint, encode};
 use crate::store::{BrickFile, BrickWriter, Resources, StoreError, ordered_by_weight};
 
 /// What a byte of a record takes while its face points are sought.
@@ -55,9 +53,7 @@ pub fn add(
             if points.is_empty() && !layers.is_anew(number) {
                 return Ok(None);
             }
-            let mut brick = layers.read(number, |record| {
-                Ok(rkyv::deserialize::<CellBrick, BoxedError>(record).expect("plain vectors"))
-            })?;
+            let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
             brick.points = points;
             let flagged = brick.flagged.len() as u64;
             let points = brick.points.len() as u64;

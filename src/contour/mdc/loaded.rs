@@ -158,9 +158,8 @@ impl Loaded {
         brick_units: i64,
     ) -> Result<Self, ContourError> {
         let shift = steps.map(|step| step * brick_units as i32);
-        let moved = |position: &rkyv::Archived<[i32; 3]>| -> [i32; 3] {
-            std::array::from_fn(|a| position[a].to_native() + shift[a])
-        };
+        let moved =
+            |position: [i32; 3]| -> [i32; 3] { std::array::from_fn(|a| position[a] + shift[a]) };
         let wrong = |expected| ContourError::Contradiction { brick: key.position(), expected };
         let is_whole = steps == [0; 3];
         let mut loaded = Self::with_room(if is_whole { record.cells.len() } else { 0 });
@@ -186,8 +185,8 @@ impl Loaded {
                 };
                 if is_wanted {
                     let position = record.positions.get(number as usize);
-                    let position =
-                        moved(position.ok_or_else(|| wrong("a position for every vertex"))?);
+                    let position = position.ok_or_else(|| wrong("a position for every vertex"))?;
+                    let position = moved(position.map(|c| c.to_native()));
                     loaded.vertices.push(Vertex { number, position, cut });
                 }
             }
@@ -201,7 +200,7 @@ impl Loaded {
         let first = record.positions.len() as u32;
         for (number, point) in (first..).zip(record.points.iter()) {
             loaded.points.push((point.key.to_native(), number));
-            loaded.point_positions.push(moved(&point.position));
+            loaded.point_positions.push(moved(point.position.map(|c| c.to_native())));
         }
         Ok(loaded)
     }

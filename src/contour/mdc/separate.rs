@@ -25,11 +25,10 @@ use crate::contour::mdc::{HAS_MULTI, INSET_UNITS, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
 use crate::geom::triangle_triangle::{Triangle, meets_improperly};
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{BrickKey, CellBrick, Domain, encode};
+use crate::octree::{BrickKey, Domain, RecordBytes, encode};
 use crate::store::{
     BrickFile, BrickWriter, Resources, StoreError, directory_name, ordered_by_weight,
 };
-use rkyv::rancor::BoxedError;
 
 /// What a byte of a record takes while it is looked at, with the sides of those around.
 const RECORD_FACTOR: u64 = 12;
@@ -64,7 +63,7 @@ struct Looked {
     key: BrickKey,
     flags: u32,
     /// `None` where nothing changes.
-    bytes: Option<rkyv::util::AlignedVec>,
+    bytes: Option<RecordBytes>,
     /// Clusters to split.
     banned: Vec<u32>,
 }
@@ -273,9 +272,7 @@ fn look_at(
     if decisions.is_empty() && !was_anew {
         return Ok(Looked { key, flags: 0, bytes: None, banned });
     }
-    let mut brick = layers.read(number, |record| {
-        Ok(rkyv::deserialize::<CellBrick, BoxedError>(record).expect("plain vectors"))
-    })?;
+    let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
     if is_wanted {
         brick.flagged.clear();
     }

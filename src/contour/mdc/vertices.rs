@@ -21,8 +21,8 @@ use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method};
 use crate::geom::qef::QefOptions;
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS, SIDE,
-    SourcePlane, decode_signs, edge_position, encode,
+    ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS,
+    RecordBytes, SIDE, SourcePlane, decode_signs, edge_position, encode,
 };
 use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
@@ -34,7 +34,7 @@ const RECORD_FACTOR_WITH_CLUSTERS: u64 = 12;
 struct Placed {
     key: u64,
     flags: u32,
-    bytes: rkyv::util::AlignedVec,
+    bytes: RecordBytes,
     stats: ContourStats,
 }
 

@@ -58,6 +58,9 @@ const POSITION_BYTES: f64 = 24.0;
 /// numbers and fans; without numbers in the file also a sort of the positions.
 const TAPE_BYTES: f64 = 130.0;
 const UNNUMBERED_TAPE_BYTES: f64 = 200.0;
+/// A triangle in the cells where pairs meet: 24 bytes, more where parcels are small, a fifth of them
+/// in several cells.
+pub const CELL_TRIANGLE_BYTES: f64 = 60.0;
 /// A vertex under way takes so much of the proof's memory, growth included.
 pub const FAN_BYTES: f64 = 250.0;
 /// Lock, manifest, headers, and what file systems round up.
@@ -82,6 +85,8 @@ pub struct DiskSteps {
     pub relabel: u64,
     /// Cells get their vertices.
     pub place: u64,
+    /// Surfaces in one cell are kept apart.
+    pub separate: u64,
     /// The surface is written.
     pub write: u64,
     /// The written file is proved.
@@ -92,8 +97,9 @@ impl DiskSteps {
     /// The largest of them.
     #[must_use]
     pub fn peak(&self) -> u64 {
-        let Self { read, bin, settle, scan, patch, flood, relabel, place, write, prove } = *self;
-        let all = [read, bin, settle, scan, patch, flood, relabel, place, write, prove];
+        let Self { read, bin, settle, scan, patch, flood, relabel, place, separate, write, prove } =
+            *self;
+        let all = [read, bin, settle, scan, patch, flood, relabel, place, separate, write, prove];
         all.into_iter().max().unwrap_or(0)
     }
 }
@@ -113,6 +119,8 @@ pub struct FileSizes {
     pub hits: f64,
     pub signs: f64,
     pub cells: f64,
+    /// Cells that are made anew: all of them where clusters are everywhere.
+    pub surface: f64,
     pub output: f64,
     /// Faces that wait until all vertices are written.
     pub aside: f64,
@@ -140,7 +148,7 @@ impl DiskModel<'_> {
         let faces = FACE_BYTES * odd + 2.0 * spilled(FACE_BYTES * odd, 0.0, share / 4.0);
         let flips = FLIP_BYTES * BORDER_SHARE * most.flips as f64;
         let regions = REGION_BYTES_PER_FACE * odd;
-        let FileSizes { hits, signs, cells, output, aside } = *files;
+        let FileSizes { hits, signs, cells, surface, output, aside } = *files;
         DiskSteps {
             read: (kept + soup + self.reader_bytes as f64) as u64,
             bin: (kept + soup + bins + runs) as u64,
@@ -150,8 +158,10 @@ impl DiskModel<'_> {
             flood: (kept + hits + flips + regions) as u64,
             relabel: (kept + hits + flips + regions + signs) as u64,
             place: (kept + hits + flips + signs + cells) as u64,
-            write: (kept + signs + cells + output + aside) as u64,
-            prove: (kept + cells + output + self.proof()) as u64,
+            // Two looks, or the last one and the surface.
+            separate: (kept + signs + cells + 2.0 * surface) as u64,
+            write: (kept + signs + cells + surface + output + aside) as u64,
+            prove: (kept + cells + surface + output + self.proof()) as u64,
         }
     }
 
@@ -177,6 +187,7 @@ impl DiskModel<'_> {
             hits: self.brick_file(hits),
             signs: self.brick_file(signs),
             cells: self.brick_file(cells),
+            surface: self.brick_file(cells),
             output: output + 512.0,
             aside,
         }
@@ -229,7 +240,8 @@ impl DiskModel<'_> {
         let hashes = spilled(HASH_BYTES * vertices, 0.0, share / 8.0);
         let scattered = FAN_BYTES * self.counts.open_vertices as f64 > share / 4.0;
         let tape = if scattered { tape * most.triangles as f64 } else { 0.0 };
-        positions + hashes + tape
+        let cells = spilled(CELL_TRIANGLE_BYTES * most.triangles as f64, 0.0, share / 20.0);
+        positions + hashes + tape + cells
     }
 }
 

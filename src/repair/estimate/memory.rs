@@ -6,7 +6,7 @@
 use crate::ingest::SoupSums;
 use crate::io::Format;
 use crate::repair::estimate::counts::Counts;
-use crate::repair::estimate::disk::{FAN_BYTES, FileSizes, SMALL_BIN};
+use crate::repair::estimate::disk::{CELL_TRIANGLE_BYTES, FAN_BYTES, FileSizes, SMALL_BIN};
 use crate::repair::plan::{MemoryPlan, WINDOW_BYTES};
 
 /// The program, and what a worker holds while bricks pass.
@@ -28,6 +28,9 @@ const FACE_BYTES: f64 = 100.0;
 /// A vertex of the output: its hash, and its position in the table of the reader.
 const HASH_BYTES: f64 = 8.0;
 const POSITION_BYTES: f64 = 24.0;
+/// A triangle while the pairs of its cell are tested; so many at one time in each thread.
+const JOINED_BYTES: f64 = 300.0;
+const MOST_JOINED: f64 = 16_384.0;
 /// What an allocator keeps of the lists of early steps; larger ones go back at once.
 const RETAINED_BYTES: f64 = (32_u32 << 20) as f64;
 /// Room that lists keep for growing.
@@ -98,6 +101,12 @@ impl MemoryModel<'_> {
             0.0
         };
         let open = (FAN_BYTES * self.counts.open_vertices as f64).min(share / 4.0);
-        (GROWTH * (hashes + positions) + open).max(whole)
+        let triangles = self.counts.at_most.triangles as f64;
+        let cells = (CELL_TRIANGLE_BYTES * triangles).min(share / 8.0);
+        let threads = self.plan.threads as f64;
+        let joined = (JOINED_BYTES * triangles)
+            .min(JOINED_BYTES * threads * MOST_JOINED)
+            .min(share / 16.0 * 3.0);
+        (GROWTH * (hashes + positions) + open + cells + joined).max(whole)
     }
 }

@@ -20,7 +20,7 @@ const PER_ODD_FACE: f64 = 600.0;
 const PER_CROSSING_SIGNED: f64 = 80.0;
 const PER_BRICK: f64 = 60_000.0;
 const PER_CROSSING_PLACED: f64 = 1400.0;
-const PER_TRIANGLE_PROVED: f64 = 180.0;
+const PER_TRIANGLE_PROVED: f64 = 600.0;
 /// Share of a stage that more threads make shorter.
 const PARALLEL: [(Stage, f64); 6] = [
     (Stage::Ingest, 0.5),
@@ -28,7 +28,7 @@ const PARALLEL: [(Stage, f64); 6] = [
     (Stage::Patch, 0.5),
     (Stage::Sign, 0.8),
     (Stage::Contour, 0.9),
-    (Stage::Verify, 0.0),
+    (Stage::Verify, 0.5),
 ];
 
 /// Seconds of each stage with so many threads.

@@ -1,0 +1,290 @@
+//! The intersections whose boxes begin to overlap in one cell.
+//!
+//! In:         the parcels of a cell.
+//! Out:        how many pairs of triangles intersect, and the first of them.
+//! Memory:     about 150 bytes a triangle, 400 at most.
+
+use std::sync::{Mutex, PoisonError};
+
+use bytemuck::{Pod, Zeroable};
+
+use crate::store::{Record, Sorter, StoreError};
+use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
+use crate::verify::intersect::near::{NearBox, NearPairs, PLACE_BITS};
+use crate::verify::intersect::pair::{Face, Sharing, intersect};
+use crate::verify::intersect::parcels::{Parcel, Unpacked};
+use crate::verify::intersect::signs::{Point, is_tame};
+use crate::verify::places::Smallest;
+use crate::verify::positions::{PositionKey, key_of};
+use crate::verify::slots::{Name, Slots};
+
+/// A cell of a grid, `1 << shift` cells of that grid wide.
+#[derive(Clone, Copy)]
+pub(crate) struct Cell {
+    pub(crate) grid: Grid,
+    pub(crate) shift: u32,
+    pub(crate) at: [u32; 3],
+}
+
+impl Cell {
+    /// Along which axes a corner lies in the cell, where the triangle that it belongs to does not
+    /// lie before it.
+    #[inline]
+    fn holds(&self, corner: Point) -> [bool; 3] {
+        std::array::from_fn(|i| self.grid.cell(i, corner[i]) >> self.shift == self.at[i])
+    }
+
+    /// Where cells were put together, a triangle lies in the parcels of several of them: it is
+    /// taken from the first.
+    #[inline]
+    pub(crate) fn takes(&self, parcel: &Parcel, low: Point) -> bool {
+        if self.shift == 0 || parcel.is_final == 1 {
+            return true;
+        }
+        let at = cell_of_key(parcel.key);
+        (0..3).all(|i| at[i] == self.grid.cell(i, low[i]).max(self.at[i] << self.shift))
+    }
+
+    /// A grid of 2^bits cells a side in this cell.
+    pub(crate) fn grid_within(&self, bits: u32) -> Grid {
+        self.grid.within(self.at, self.shift, bits)
+    }
+}
+
+/// Work for one worker.
+pub(crate) struct CellTask {
+    /// The cell, and behind it those that it lies in.
+    pub(crate) cells: Vec<Cell>,
+    pub(crate) parcels: Vec<Parcel>,
+    pub(crate) words: Vec<u32>,
+    /// Whether vertices have numbers.
+    pub(crate) named: bool,
+    /// If the cell is too crowded for memory: only pairs of a triangle before this parcel and one
+    /// from there on.
+    pub(crate) border: Option<usize>,
+    /// Whether its triangles count as progress.
+    pub(crate) counts: bool,
+}
+
+/// A pair of triangles, by the smaller number first.
+pub(crate) type Pair = [u64; 2];
+
+/// A pair that may be found in several cells, since one of the two is wide, see [`Grid::is_wide`].
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct WidePair {
+    pub(crate) pair: Pair,
+    pub(crate) place: Point,
+}
+
+impl Record for WidePair {
+    type Key = Pair;
+    fn key(&self) -> Pair {
+        self.pair
+    }
+}
+
+/// Pairs that may be found in several cells; they are counted when all are there.
+pub(crate) type WidePairs = Mutex<Sorter<WidePair>>;
+
+/// Pairs that a worker keeps back before it hands them on.
+const MOST_KEPT: usize = 256;
+/// Pairs that wait until they are tested together.
+const MOST_QUEUED: usize = 512;
+
+/// What was found.
+pub(crate) struct Found {
+    pub(crate) pairs: u64,
+    /// The first pairs, and where the overlaps of their boxes have their middles.
+    pub(crate) places: Smallest<Pair, Point>,
+    /// Triangles that begin in the cell.
+    pub(crate) triangles: u64,
+}
+
+impl Found {
+    pub(crate) fn new() -> Self {
+        Self { pairs: 0, places: Smallest::new(), triangles: 0 }
+    }
+
+    pub(crate) fn add(&mut self, other: &Self) {
+        self.pairs += other.pairs;
+        self.triangles += other.triangles;
+        other.places.iter().for_each(|&(pair, place)| self.places.offer(pair, place));
+    }
+}
+
+/// Room for a cell's triangles, used again and again.
+#[derive(Default)]
+pub(crate) struct Workbench {
+    positions: Vec<Point>,
+    tame: Vec<bool>,
+    faces: Vec<Face>,
+    numbers: Vec<u64>,
+    near: NearPairs,
+    is_wide: Vec<bool>,
+    places: Vec<u32>,
+    begun: u64,
+    /// Pairs to be tested, by the number of corners that they share.
+    queues: [Vec<(u32, u32, Sharing)>; 4],
+}
+
+impl Workbench {
+    /// Tests all pairs of a cell.
+    pub(crate) fn join(&mut self, task: &CellTask, wide: &WidePairs) -> Result<Found, StoreError> {
+        let border = if task.named {
+            self.unpack(task, |unpacked, at, _| unpacked.names[at])
+        } else {
+            self.unpack(task, |_, _, position| -> PositionKey { key_of(position) })
+        };
+        let crosses = task.border.is_some();
+        let Self { positions, faces, numbers, near, is_wide, queues, begun, .. } = self;
+        let mut judge = Judge {
+            positions,
+            faces,
+            numbers,
+            is_wide,
+            found: Found::new(),
+            kept: Vec::new(),
+            wide,
+            failure: None,
+        };
+        near.each(&mut |a, b| {
+            if crosses && ((a as usize) < border) == ((b as usize) < border) {
+                return;
+            }
+            let sharing = Sharing::of(&faces[a as usize], &faces[b as usize]);
+            let queue = &mut queues[sharing.count()];
+            queue.push((a, b, sharing));
+            if queue.len() == MOST_QUEUED {
+                judge.judge(queue);
+            }
+        });
+        queues.iter_mut().for_each(|queue| judge.judge(queue));
+        judge.hand_on();
+        let Judge { mut found, failure, .. } = judge;
+        found.triangles = if task.counts { *begun } else { 0 };
+        failure.map_or(Ok(found), Err)
+    }
+
+    /// Lists the triangles, with one number for each vertex; how many lie before the border.
+    fn unpack<N: Name>(
+        &mut self,
+        task: &CellTask,
+        name_of: impl Fn(&Unpacked<'_>, usize, Point) -> N,
+    ) -> usize {
+        let Self { positions, tame, faces, numbers, near, is_wide, places, begun, .. } = self;
+        positions.clear();
+        tame.clear();
+        faces.clear();
+        numbers.clear();
+        near.boxes.clear();
+        is_wide.clear();
+        *begun = 0;
+        let mut slots = Slots::<N>::new();
+        let grid = task.cells[0].grid_within(PLACE_BITS);
+        let mut words = &task.words[..];
+        let mut before_border = usize::MAX;
+        for (at, parcel) in task.parcels.iter().enumerate() {
+            if task.border == Some(at) {
+                before_border = faces.len();
+            }
+            let (own, others) = words.split_at(parcel.words(task.named));
+            words = others;
+            let unpacked = parcel.unpack(task.named, own);
+            places.clear();
+            for (at, position) in unpacked.positions().enumerate() {
+                let next = positions.len() as u32;
+                let place = slots.find_or_enter(name_of(&unpacked, at, position), next);
+                if place == next {
+                    positions.push(position);
+                    tame.push(is_tame(&position));
+                }
+                places.push(place);
+            }
+            for (number, corners) in unpacked.triangles() {
+                let vertices = corners.map(|corner| places[corner]);
+                let corners = vertices.map(|vertex| positions[vertex as usize]);
+                let [low, high] = box_of(&corners);
+                if !task.cells[0].takes(parcel, low) {
+                    continue;
+                }
+                let mut starts = [true; 3];
+                for cell in &task.cells {
+                    let within = cell.holds(low);
+                    starts = std::array::from_fn(|i| starts[i] && within[i]);
+                }
+                *begun += u64::from(starts == [true; 3]);
+                let wide = task.cells[0].grid.is_wide(extent_of(&[low, high]));
+                if wide {
+                    // It may be missing in the cell where an overlap starts, so every cell counts.
+                    starts = [true; 3];
+                }
+                is_wide.push(wide);
+                let range = grid.range(low, high);
+                near.boxes.push(NearBox::new(range.low, range.high, starts));
+                let is_tame = vertices.iter().all(|&vertex| tame[vertex as usize]);
+                faces.push(Face::of(vertices, corners, is_tame));
+                numbers.push(number);
+            }
+        }
+        before_border.min(faces.len())
+    }
+}
+
+/// Tests pairs of a cell.
+struct Judge<'b> {
+    positions: &'b [Point],
+    faces: &'b [Face],
+    numbers: &'b [u64],
+    is_wide: &'b [bool],
+    found: Found,
+    kept: Vec<WidePair>,
+    wide: &'b WidePairs,
+    failure: Option<StoreError>,
+}
+
+impl Judge<'_> {
+    /// Tests the pairs of a queue and empties it. They all share the same number of corners, so
+    /// that the tests take the same way.
+    fn judge(&mut self, queue: &mut Vec<(u32, u32, Sharing)>) {
+        for (a, b, sharing) in queue.drain(..) {
+            let [a, b] = [a as usize, b as usize];
+            if intersect(sharing, &self.faces[a], &self.faces[b], self.positions) {
+                self.enter(a, b);
+            }
+        }
+    }
+
+    #[cold]
+    fn enter(&mut self, a: usize, b: usize) {
+        let corner = |vertex: u32| self.positions[vertex as usize];
+        let place = middle_of_overlap([a, b].map(|at| self.faces[at].vertices.map(corner)));
+        let numbers = [self.numbers[a], self.numbers[b]];
+        let pair = [numbers[0].min(numbers[1]), numbers[0].max(numbers[1])];
+        if self.is_wide[a] || self.is_wide[b] {
+            self.kept.push(WidePair { pair, place });
+            if self.kept.len() == MOST_KEPT {
+                self.hand_on();
+            }
+        } else {
+            self.found.pairs += 1;
+            self.found.places.offer(pair, place);
+        }
+    }
+
+    fn hand_on(&mut self) {
+        // The sort does not care in which order they come, nor whether another worker failed.
+        let mut wide = self.wide.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Err(error) = wide.extend(&self.kept) {
+            self.failure.get_or_insert(error);
+        }
+        self.kept.clear();
+    }
+}
+
+/// The middle of the overlap of two boxes, by which a pair is found again.
+#[cold]
+fn middle_of_overlap(corners: [[Point; 3]; 2]) -> Point {
+    let [[a_low, a_high], [b_low, b_high]] = corners.map(|corners| box_of(&corners));
+    std::array::from_fn(|i| a_low[i].max(b_low[i]).midpoint(a_high[i].min(b_high[i])) + 0.0)
+}

@@ -1,0 +1,331 @@
+//! The order of the cells: those that fit in memory go to the workers, crowded ones are divided.
+//!
+//! In:         triangles by cell.
+//! Out:        the intersecting pairs of all cells.
+//! Invariant:  a cell whose division does not help, since its triangles are wide or all at one
+//!             place, is joined chunk by chunk, each with each.
+//! Memory:     tasks under way, cells that are divided, and the pairs of wide triangles; see
+//!             [`Shares`].
+
+use std::sync::{Mutex, PoisonError};
+
+use rayon::ThreadPool;
+
+use crate::monitor::Monitor;
+use crate::store::{Scratch, Sorter, StoreError, ordered};
+use crate::verify::intersect::cell::{Cell, CellTask, Found, WidePairs, Workbench};
+use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
+use crate::verify::intersect::parcels::{Packed, Packer, Parcel};
+use crate::verify::intersect::reach::Reach;
+use crate::verify::spool::Spool;
+use crate::verify::tape::stop_if_asked;
+
+/// What a triangle takes at most in a worker, and in the tasks that wait for it.
+const TASK_BYTES: u64 = 400;
+/// More triangles at one time make no worker faster.
+const MOST_TRIANGLES: u64 = 16 << 10;
+const LEAST_TRIANGLES: u64 = 48;
+/// Of a parcel: a chunk of several must fit.
+const MOST_PARCEL_TRIANGLES: usize = 2048;
+/// Cells inside of each other.
+const MOST_LEVELS: usize = 10;
+/// Divisions that did not help, one inside of the other, until chunks are joined.
+const MOST_STALLS: u32 = 3;
+/// A division makes at most 2^bits cells a side.
+const MOST_BITS: u32 = 6;
+
+/// How the memory is shared out.
+#[derive(Clone, Copy)]
+pub(crate) struct Shares {
+    /// For triangles that arrive.
+    pub(crate) early_bytes: u64,
+    /// Triangles that a worker takes at one time.
+    pub(crate) cell_triangles: u64,
+}
+
+impl Shares {
+    pub(crate) fn new(share_bytes: u64, threads: usize) -> Self {
+        let early_bytes = share_bytes / 4;
+        let task = share_bytes / 8 * 3 / threads as u64 / TASK_BYTES;
+        Self { early_bytes, cell_triangles: task.clamp(LEAST_TRIANGLES, MOST_TRIANGLES) }
+    }
+
+    /// Triangles of a parcel.
+    pub(crate) fn parcel_triangles(&self) -> usize {
+        (self.cell_triangles as usize / 4).min(MOST_PARCEL_TRIANGLES)
+    }
+
+    /// For cells that are divided, so many inside of each other.
+    fn level_bytes(&self, depth: usize) -> u64 {
+        self.early_bytes >> depth
+    }
+
+    fn wide_pair_bytes(&self) -> u64 {
+        self.early_bytes / 4
+    }
+}
+
+/// What a join works with.
+pub(crate) struct Join<'p> {
+    pub(crate) scratch: &'p Scratch,
+    pub(crate) shares: Shares,
+    pub(crate) monitor: &'p dyn Monitor,
+}
+
+impl Join<'_> {
+    /// Joins the cells of a grid, put together to cells `1 << shift` times as wide.
+    pub(crate) fn run(
+        self,
+        grid: Grid,
+        shift: u32,
+        packer: Packer,
+        pool: &ThreadPool,
+    ) -> Result<Found, StoreError> {
+        let monitor = self.monitor;
+        let wide: WidePairs = Mutex::new(Sorter::new(self.scratch, self.shares.wide_pair_bytes()));
+        let mut found = Found::new();
+        let mut cells = Cells::new(self, Level::new(grid, shift, packer)?);
+        ordered(
+            pool,
+            || cells.next_task(),
+            Workbench::default,
+            |bench, task: CellTask| bench.join(&task, &wide),
+            |of_cell| {
+                found.add(&of_cell);
+                monitor.advance(of_cell.triangles);
+                Ok(())
+            },
+        )?;
+        let mut pairs = wide.into_inner().unwrap_or_else(PoisonError::into_inner).finish()?;
+        let mut last = None;
+        while let Some(next) = pairs.next()? {
+            if last != Some(next.pair) {
+                found.pairs += 1;
+                found.places.offer(next.pair, next.place);
+                last = Some(next.pair);
+            }
+        }
+        Ok(found)
+    }
+}
+
+/// The cells of one grid.
+struct Level {
+    grid: Grid,
+    shift: u32,
+    packed: Packed,
+    next: Option<Parcel>,
+    /// The cells that this grid divides, from the inside out.
+    around: Vec<Cell>,
+    /// Triangles in the divided cell.
+    triangles: u64,
+    stalls: u32,
+}
+
+/// The parcels of a cell.
+struct Group {
+    /// The cell, and behind it those that it lies in.
+    cells: Vec<Cell>,
+    parcels: Spool<Parcel>,
+    triangles: u64,
+    extents: f64,
+}
+
+impl Level {
+    fn new(grid: Grid, shift: u32, packer: Packer) -> Result<Self, StoreError> {
+        let mut packed = packer.finish()?;
+        let next = packed.next()?;
+        Ok(Self { grid, shift, packed, next, around: Vec::new(), triangles: u64::MAX, stalls: 0 })
+    }
+
+    fn next_group(&mut self, scratch: &Scratch, share: u64) -> Result<Option<Group>, StoreError> {
+        let Some(first) = self.next else { return Ok(None) };
+        let key = first.key >> (3 * self.shift);
+        let cell = Cell { grid: self.grid, shift: self.shift, at: cell_of_key(key) };
+        let cells = std::iter::once(cell).chain(self.around.iter().copied()).collect();
+        let parcels = Spool::new(scratch, share);
+        let mut group = Group { cells, parcels, triangles: 0, extents: 0.0 };
+        while let Some(parcel) = self.next.filter(|next| next.key >> (3 * self.shift) == key) {
+            group.parcels.push(parcel)?;
+            group.triangles += u64::from(parcel.triangles);
+            group.extents += parcel.extents;
+            self.next = self.packed.next()?;
+        }
+        Ok(Some(group))
+    }
+}
+
+/// All cells, one after the other.
+struct Cells<'p> {
+    join: Join<'p>,
+    levels: Vec<Level>,
+    crowd: Option<Crowd>,
+}
+
+impl<'p> Cells<'p> {
+    fn new(join: Join<'p>, root: Level) -> Self {
+        Self { join, levels: vec![root], crowd: None }
+    }
+
+    fn next_task(&mut self) -> Result<Option<CellTask>, StoreError> {
+        let Join { scratch, shares, monitor } = self.join;
+        loop {
+            stop_if_asked(monitor)?;
+            let depth = self.levels.len();
+            let Some(level) = self.levels.last_mut() else { return Ok(None) };
+            if let Some(crowd) = &mut self.crowd {
+                if let Some(task) = crowd.next_task(&level.packed, shares.cell_triangles / 2)? {
+                    return Ok(Some(task));
+                }
+                self.crowd = None;
+            }
+            let Some(group) = level.next_group(scratch, shares.level_bytes(4))? else {
+                self.levels.pop();
+                continue;
+            };
+            if group.triangles <= shares.cell_triangles {
+                let count = group.parcels.len();
+                let mut task = task_of(&level.packed, group.cells.clone());
+                append(&mut task, &level.packed, &group.parcels, 0..count)?;
+                return Ok(Some(task));
+            }
+            let stalls = match group.triangles / 3 > level.triangles / 4 {
+                true => level.stalls + 1,
+                false => 0,
+            };
+            let bits = group.bits(shares.cell_triangles);
+            if bits == 0 || stalls >= MOST_STALLS || depth >= MOST_LEVELS {
+                self.crowd = Some(Crowd { group, first: 0, second: None });
+                continue;
+            }
+            let share = shares.level_bytes(depth);
+            let packer = Packer::new(scratch, share, shares.parcel_triangles());
+            let child = group.divide(&level.packed, bits, stalls, packer, monitor)?;
+            self.levels.push(child);
+        }
+    }
+}
+
+impl Group {
+    /// Into how many cells a side it should be divided, as a power of two; 0 if that is of no use.
+    fn bits(&self, cell_triangles: u64) -> u32 {
+        let cell = &self.cells[0];
+        let side = cell.grid.side() * f64::from(1_u32 << cell.shift);
+        let widths = side * self.triangles as f64 / (4.0 * self.extents);
+        // As many as a sheet needs, but no finer than the triangles.
+        let wanted = (2 * self.triangles / cell_triangles).ilog2().div_ceil(2) + 1;
+        let possible = if widths < 2.0 { 0 } else { widths.min(1e9).log2() as u32 };
+        wanted.min(possible).min(MOST_BITS)
+    }
+
+    /// Puts its triangles into the cells of a finer grid.
+    fn divide(
+        self,
+        packed: &Packed,
+        bits: u32,
+        stalls: u32,
+        mut packer: Packer,
+        monitor: &dyn Monitor,
+    ) -> Result<Level, StoreError> {
+        let grid = self.cells[0].grid_within(bits);
+        let (mut parcels, mut words) = (Vec::new(), Vec::new());
+        let mut at = 0;
+        while let Some(&parcel) = self.parcels.block(at, 1, &mut parcels)?.first() {
+            stop_if_asked(monitor)?;
+            at += 1;
+            words.clear();
+            packed.read(&parcel, &mut words)?;
+            for arrival in parcel.unpack(packed.named, &words).arrivals() {
+                let bounds = box_of(&arrival.corners);
+                if !self.cells[0].takes(&parcel, bounds[0]) {
+                    continue;
+                }
+                let range = grid.range(bounds[0], bounds[1]);
+                if grid.is_wide(extent_of(&bounds)) {
+                    Reach::new(&arrival.corners)
+                        .try_each(&grid, &range, 0, &mut |cell| packer.add(cell, &arrival))?;
+                } else {
+                    range.try_each(|cell| packer.add(cell, &arrival))?;
+                }
+            }
+        }
+        let mut level = Level::new(grid, 0, packer)?;
+        level.around = self.cells;
+        level.triangles = self.triangles;
+        level.stalls = stalls;
+        Ok(level)
+    }
+}
+
+/// A cell that does not fit in memory and that no division makes smaller.
+struct Crowd {
+    group: Group,
+    /// The first parcel of the first chunk.
+    first: u64,
+    /// The first parcel of the second chunk; before that the first chunk is joined with itself.
+    second: Option<u64>,
+}
+
+impl Crowd {
+    /// The next two chunks, of so many triangles at most.
+    fn next_task(&mut self, packed: &Packed, most: u64) -> Result<Option<CellTask>, StoreError> {
+        let count = self.group.parcels.len();
+        if self.second.is_some_and(|second| second >= count) {
+            self.first = self.chunk_end(self.first, most)?;
+            self.second = None;
+        }
+        if self.first >= count {
+            return Ok(None);
+        }
+        let end = self.chunk_end(self.first, most)?;
+        let mut task = task_of(packed, self.group.cells.clone());
+        append(&mut task, packed, &self.group.parcels, self.first..end)?;
+        match self.second {
+            None => self.second = Some(end),
+            Some(second) => {
+                let second_end = self.chunk_end(second, most)?;
+                task.border = Some(task.parcels.len());
+                task.counts = false;
+                append(&mut task, packed, &self.group.parcels, second..second_end)?;
+                self.second = Some(second_end);
+            }
+        }
+        Ok(Some(task))
+    }
+
+    /// Where a chunk ends; it has one parcel at least.
+    fn chunk_end(&self, first: u64, most: u64) -> Result<u64, StoreError> {
+        let (mut at, mut triangles) = (first, 0);
+        let mut buffer = Vec::new();
+        while let Some(parcel) = self.group.parcels.block(at, 1, &mut buffer)?.first() {
+            triangles += u64::from(parcel.triangles);
+            if triangles > most && at > first {
+                break;
+            }
+            at += 1;
+        }
+        Ok(at)
+    }
+}
+
+fn task_of(packed: &Packed, cells: Vec<Cell>) -> CellTask {
+    let (parcels, words) = (Vec::new(), Vec::new());
+    CellTask { cells, parcels, words, named: packed.named, border: None, counts: true }
+}
+
+/// Appends some parcels to a task.
+fn append(
+    task: &mut CellTask,
+    packed: &Packed,
+    parcels: &Spool<Parcel>,
+    range: std::ops::Range<u64>,
+) -> Result<(), StoreError> {
+    let mut buffer = Vec::new();
+    for at in range {
+        let block = parcels.block(at, 1, &mut buffer)?;
+        let parcel = block.first().copied().expect("ranges of parcels end where the list ends");
+        packed.read(&parcel, &mut task.words)?;
+        task.parcels.push(parcel);
+    }
+    Ok(())
+}

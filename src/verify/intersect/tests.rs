@@ -1,0 +1,404 @@
+//! Pairs against an independent clipper in whole numbers; meshes against all pairs; the same for
+//! any share and any number of threads.
+
+use std::convert::Infallible;
+
+use proptest::prelude::*;
+use rayon::ThreadPoolBuilder;
+
+use crate::defect::{Defect, DefectKind, IntersectingTriangles};
+use crate::mesh::shapes::{Corners, ListedTriangles, Random, sphere};
+use crate::monitor::Void;
+use crate::store::Scratch;
+use crate::verify::intersect::exact_pair::meet;
+use crate::verify::intersect::pair::{Face, Sharing, intersect};
+use crate::verify::intersect::signs::{Point, Signs, is_tame};
+use crate::verify::positions::key_of;
+use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
+
+/// A point over a common denominator, which is positive and comes last.
+type Ratio = [i128; 4];
+type Whole = [i64; 3];
+
+fn reduced(p: Ratio) -> Ratio {
+    let gcd = p.iter().fold(0_i128, |a, &b| {
+        let (mut a, mut b) = (a.abs(), b.abs());
+        while b != 0 {
+            (a, b) = (b, a % b);
+        }
+        a
+    });
+    p.map(|x| x / gcd * p[3].signum())
+}
+
+/// The part of a convex polygon where `plane`, a normal and a constant, is not negative.
+fn clipped(polygon: &[Ratio], plane: [i128; 4]) -> Vec<Ratio> {
+    let height = |p: &Ratio| (0..4).map(|i| plane[i] * p[i]).sum::<i128>();
+    let mut kept = Vec::new();
+    for (at, p) in polygon.iter().enumerate() {
+        let q = &polygon[(at + 1) % polygon.len()];
+        let (from, to) = (height(p), height(q));
+        if from >= 0 {
+            kept.push(*p);
+        }
+        if from.signum() * to.signum() < 0 {
+            kept.push(reduced(std::array::from_fn(|i| p[i] * to - q[i] * from)));
+        }
+    }
+    kept
+}
+
+fn minus(p: Whole, q: Whole) -> Whole {
+    std::array::from_fn(|i| p[i] - q[i])
+}
+
+fn cross(u: Whole, v: Whole) -> Whole {
+    std::array::from_fn(|i| u[(i + 1) % 3] * v[(i + 2) % 3] - u[(i + 2) % 3] * v[(i + 1) % 3])
+}
+
+fn dot(u: Whole, v: Whole) -> i64 {
+    (0..3).map(|i| u[i] * v[i]).sum()
+}
+
+fn is_flat([a, b, c]: [Whole; 3]) -> bool {
+    cross(minus(b, a), minus(c, a)) == [0; 3]
+}
+
+/// The corners of the intersection of two triangles.
+fn common_polygon(a: [Whole; 3], b: [Whole; 3]) -> Vec<Ratio> {
+    let normal = cross(minus(b[1], b[0]), minus(b[2], b[0]));
+    let plane = |normal: Whole, through: Whole| {
+        let [x, y, z] = normal.map(i128::from);
+        [x, y, z, -i128::from(dot(normal, through))]
+    };
+    let own = plane(normal, b[0]);
+    let mut planes = vec![own, own.map(|x| -x)];
+    for [s, t] in [[0, 1], [1, 2], [2, 0]] {
+        planes.push(plane(cross(normal, minus(b[t], b[s])), b[s]));
+    }
+    let mut polygon: Vec<Ratio> =
+        a.map(|[x, y, z]| [i128::from(x), i128::from(y), i128::from(z), 1]).to_vec();
+    for plane in planes {
+        polygon = clipped(&polygon, plane);
+    }
+    polygon
+}
+
+/// Whether all of the intersection of two triangles is shared; shared corners have equal names.
+fn brute_force(a: [Whole; 3], b: [Whole; 3], names: [[u32; 3]; 2]) -> bool {
+    let shared: Vec<Whole> =
+        (0..3).filter(|&i| names[1].contains(&names[0][i])).map(|i| a[i]).collect();
+    let polygon = common_polygon(a, b);
+    let at = |p: &Ratio, q: Whole| (0..3).all(|i| p[i] == i128::from(q[i]) * p[3]);
+    match shared[..] {
+        [] => !polygon.is_empty(),
+        [v] => polygon.iter().any(|p| !at(p, v)),
+        [u, v] => polygon.iter().any(|p| {
+            // On the line of the edge its length tells whether it is between the ends.
+            let from =
+                |q: Whole| -> [i128; 3] { std::array::from_fn(|i| p[i] - i128::from(q[i]) * p[3]) };
+            let (s, t) = (from(u), from(v));
+            let turned =
+                (0..3).any(|i| s[(i + 1) % 3] * t[(i + 2) % 3] != s[(i + 2) % 3] * t[(i + 1) % 3]);
+            turned || (0..3).map(|i| s[i] * t[i]).sum::<i128>() > 0
+        }),
+        _ => true,
+    }
+}
+
+fn by_filters_and_signs(points: &[Point], a: [u32; 3], b: [u32; 3]) -> bool {
+    let face = |vertices: [u32; 3]| {
+        let corners = vertices.map(|v| points[v as usize]);
+        Face::of(vertices, corners, corners.iter().all(is_tame))
+    };
+    let (a, b) = (face(a), face(b));
+    intersect(Sharing::of(&a, &b), &a, &b, points)
+}
+
+/// Some corners of two triangles: `shared` of them are the same.
+fn two_triangles(most: i64) -> impl Strategy<Value = (Vec<Whole>, usize)> {
+    (prop::collection::vec(prop::array::uniform3(0..=most), 6), 0..4_usize)
+}
+
+fn check_pair(
+    points: &[Whole],
+    shared: usize,
+    scale: f64,
+    turn: usize,
+) -> Result<(), TestCaseError> {
+    let a = [0, 1, 2];
+    let b: [u32; 3] = std::array::from_fn(|i| if i < shared { i as u32 } else { i as u32 + 3 });
+    // Any order of corners.
+    let b: [u32; 3] = std::array::from_fn(|i| b[(i + turn) % 3]);
+    let corners = [a, b].map(|t| t.map(|v| points[v as usize]));
+    if corners.into_iter().any(is_flat) {
+        return Ok(());
+    }
+    let expected = brute_force(corners[0], corners[1], [a, b]);
+    let places: Vec<Point> = points.iter().map(|p| p.map(|x| x as f64 * scale)).collect();
+    prop_assert_eq!(by_filters_and_signs(&places, a, b), expected);
+    prop_assert_eq!(by_filters_and_signs(&places, b, a), expected);
+    Ok(())
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(20_000))]
+
+    #[test]
+    fn pairs_are_judged_like_by_clipping(
+        (points, shared) in two_triangles(4), turn in 0..3_usize, wide in any::<bool>(),
+    ) {
+        // The second scale is beyond what adaptive arithmetic can do.
+        check_pair(&points, shared, if wide { f64::MIN_POSITIVE } else { 0.375 }, turn)?;
+    }
+
+    #[test]
+    fn pairs_in_a_plane_are_judged_like_by_clipping(
+        (points, shared) in two_triangles(3), turn in 0..3_usize, slope in 0..3_i64,
+    ) {
+        let points: Vec<Whole> =
+            points.iter().map(|&[x, y, _]| [x, y, slope * x - y + 3]).collect();
+        check_pair(&points, shared, 1.0, turn)?;
+    }
+
+    #[test]
+    fn flat_pairs_along_an_axis_are_judged_like_by_clipping(
+        (points, shared) in two_triangles(3), turn in 0..3_usize, axis in 0..3_usize,
+    ) {
+        let flat = |p: &Whole| std::array::from_fn(|i| if i == axis { 2 } else { p[i] });
+        check_pair(&points.iter().map(flat).collect::<Vec<_>>(), shared, 1.0, turn)?;
+    }
+}
+
+/// A mesh with vertex numbers.
+#[derive(Clone, Default)]
+struct Mesh {
+    vertices: Vec<Point>,
+    triangles: Vec<[u32; 3]>,
+}
+
+impl Mesh {
+    fn of(corners: &[Corners]) -> Self {
+        let mut mesh = Self::default();
+        let mut numbers = std::collections::HashMap::new();
+        for corners in corners {
+            mesh.triangles.push(corners.map(|corner| {
+                *numbers.entry(key_of(corner)).or_insert_with(|| {
+                    mesh.vertices.push(corner);
+                    mesh.vertices.len() as u32 - 1
+                })
+            }));
+        }
+        mesh
+    }
+
+    /// Adds a triangle with vertices of its own.
+    fn add(&mut self, corners: [Point; 3]) {
+        let next = self.vertices.len() as u32;
+        self.vertices.extend(corners);
+        self.triangles.push([next, next + 1, next + 2]);
+    }
+
+    fn corners(&self) -> Vec<Corners> {
+        let corner = |v: u32| self.vertices[v as usize];
+        self.triangles.iter().map(|t| t.map(corner)).collect()
+    }
+
+    /// All pairs of triangles with areas that intersect, by exact signs alone.
+    fn intersecting(&self) -> Vec<[u64; 2]> {
+        let corners = self.corners();
+        let mut pairs = Vec::new();
+        let flat = |[a, b, c]: Corners| {
+            let signs = Signs { tame: [a, b, c].iter().all(is_tame) };
+            (0..3).all(|axis| signs.turn(axis, a, b, c) == 0)
+        };
+        let flat: Vec<bool> = corners.iter().map(|&t| flat(t)).collect();
+        for i in 0..corners.len() {
+            for j in i + 1..corners.len() {
+                let (a, b) = (self.triangles[i], self.triangles[j]);
+                let overlaps = (0..3).all(|k| {
+                    let [p, q] = [corners[i], corners[j]].map(|t| t.map(|c| c[k]));
+                    let low = |p: [f64; 3]| p.into_iter().fold(f64::INFINITY, f64::min);
+                    let high = |p: [f64; 3]| p.into_iter().fold(f64::NEG_INFINITY, f64::max);
+                    low(p) <= high(q) && low(q) <= high(p)
+                });
+                if flat[i] || flat[j] || !overlaps {
+                    continue;
+                }
+                let (mut first, mut second) = (Vec::new(), Vec::new());
+                for shares in [true, false] {
+                    first.extend((0..3).filter(|&k| b.contains(&a[k]) == shares));
+                }
+                let shared = (0..3).filter(|&k| b.contains(&a[k])).count();
+                for &k in &first[..shared] {
+                    second.extend((0..3).find(|&m| b[m] == a[k]));
+                }
+                second.extend((0..3).filter(|&m| !a.contains(&b[m])));
+                let p = std::array::from_fn(|k| corners[i][first[k]]);
+                let q = std::array::from_fn(|k| corners[j][second[k]]);
+                let tame = p.iter().chain(&q).all(is_tame);
+                if meet(Signs { tame }, p, q, shared) {
+                    pairs.push([i as u64, j as u64]);
+                }
+            }
+        }
+        pairs
+    }
+}
+
+fn proof(mesh: &Mesh, indexed: bool, share_bytes: u64, threads: usize) -> Proof {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scratch = Scratch::new(folder.path());
+    let source = if indexed {
+        ListedTriangles::with_indices(&mesh.vertices, mesh.triangles.clone())
+    } else {
+        ListedTriangles::without_indices(mesh.corners())
+    };
+    let mut open =
+        || -> Result<ProvedSource<'_, Infallible>, Infallible> { Ok(Box::new(source.clone())) };
+    let options = ProofOptions { share_bytes, outward: Outward::NotAsked, intersections: true };
+    let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
+    prove(&mut open, &scratch, &options, &pool, &Void).expect("nothing fails in memory")
+}
+
+/// Asserts that the pairs of a mesh are found, with small and large shares, alone and together.
+fn check(mesh: &Mesh) -> u64 {
+    let welded = Mesh::of(&mesh.corners());
+    let mut found = 0;
+    for (indexed, expected) in [(true, mesh.intersecting()), (false, welded.intersecting())] {
+        for (share_bytes, threads) in [(64 << 20, 1), (64 << 20, 4), (16 << 10, 1), (16 << 10, 4)] {
+            let proof = proof(mesh, indexed, share_bytes, threads);
+            let name = format!("indexed: {indexed}, {share_bytes} bytes, {threads} threads");
+            assert_eq!(proof.intersecting_pairs, expected.len() as u64, "{name}");
+            let pairs = proof.places.iter().filter_map(|defect| match defect {
+                Defect::IntersectingTriangles(IntersectingTriangles { triangles, .. }) => {
+                    Some(*triangles)
+                }
+                _ => None,
+            });
+            let first = &expected[..expected.len().min(8)];
+            assert_eq!(pairs.collect::<Vec<_>>(), first, "{name}");
+            found = found.max(proof.intersecting_pairs);
+        }
+    }
+    found
+}
+
+fn in_box(random: &mut Random, size: f64) -> Point {
+    std::array::from_fn(|_| (random.share() - 0.5) * size)
+}
+
+/// A triangle of about a size at some place.
+fn triangle(random: &mut Random, space: f64, size: f64) -> [Point; 3] {
+    let at = in_box(random, space);
+    std::array::from_fn(|_| {
+        let by = in_box(random, size);
+        std::array::from_fn(|i| at[i] + by[i])
+    })
+}
+
+#[test]
+fn a_sphere_has_no_intersections_and_triangles_through_it_are_found() {
+    let mut mesh = Mesh::of(&sphere([0.1, 0.2, 0.3], 1.0, 30));
+    assert_eq!(check(&mesh), 0);
+    let mut random = Random::new(3);
+    for size in [0.02, 0.1, 0.5, 3.0] {
+        for _ in 0..5 {
+            mesh.add(triangle(&mut random, 2.0, size));
+        }
+    }
+    assert!(check(&mesh) > 100);
+}
+
+#[test]
+fn soups_that_touch_everywhere_are_judged_like_by_all_pairs() {
+    let mut random = Random::new(8);
+    for most in [4.0, 9.0] {
+        let mut mesh = Mesh::default();
+        for z in 0..125_u32 {
+            mesh.vertices.push([z % 5, z / 5 % 5, z / 25].map(|x| f64::from(x) * most / 4.0));
+        }
+        for _ in 0..300 {
+            mesh.triangles.push(std::array::from_fn(|_| (random.share() * 125.0) as u32));
+        }
+        assert!(check(&mesh) > 1000);
+    }
+}
+
+#[test]
+fn tiny_triangles_before_huge_ones_and_huge_ones_before_tiny_ones() {
+    let mut random = Random::new(13);
+    for sizes in [[0.01, 5.0], [5.0, 0.01]] {
+        let mut mesh = Mesh::default();
+        for size in sizes {
+            for _ in 0..700 {
+                mesh.add(triangle(&mut random, 4.0, size));
+            }
+        }
+        assert!(check(&mesh) > 1000);
+    }
+}
+
+#[test]
+fn crowds_at_one_place_and_specks_far_away_are_no_trouble() {
+    let mut random = Random::new(21);
+    let mut mesh = Mesh::default();
+    // A fan whose triangles all share one vertex, and others that go through it.
+    mesh.vertices.push([0.0, 0.0, 1.0]);
+    for i in 0..1200 {
+        let angle = f64::from(i) * std::f64::consts::TAU / 1200.0;
+        mesh.vertices.push([angle.cos(), angle.sin(), 0.0]);
+    }
+    for i in 0..1200 {
+        mesh.triangles.push([0, 1 + i, 1 + (i + 1) % 1200]);
+    }
+    for _ in 0..40 {
+        let thin = triangle(&mut random, 0.001, 0.002);
+        mesh.add(thin.map(|[x, y, z]| [x, y, z + 1.0]));
+    }
+    for place in [1e9_f64, -1e200, 1e307] {
+        let far = triangle(&mut random, 1.0, place.abs() / 8.0);
+        mesh.add(far.map(|p| p.map(|x| x + place)));
+    }
+    assert!(check(&mesh) > 100);
+}
+
+#[test]
+fn a_mesh_of_any_magnitude_is_judged_alike() {
+    let mut random = Random::new(34);
+    let mut mesh = Mesh::of(&sphere([0.0; 3], 1.0, 8));
+    for _ in 0..20 {
+        mesh.add(triangle(&mut random, 2.0, 0.5));
+    }
+    let counts = [1.0, 1e-120, 1e100, 1e-300].map(|scale| {
+        let mut scaled = mesh.clone();
+        // A power of two keeps all bits.
+        let scale = f64::from_bits(f64::to_bits(scale) & !((1 << 52) - 1));
+        scaled.vertices.iter_mut().flatten().for_each(|x| *x *= scale);
+        check(&scaled)
+    });
+    assert!(counts[0] > 5 && counts.iter().all(|&count| count == counts[0]), "{counts:?}");
+}
+
+#[test]
+fn a_triangle_twice_and_vertices_in_one_place_intersect() {
+    let tetrahedron = Mesh {
+        vertices: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
+        triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+    };
+    assert_eq!(check(&tetrahedron), 0);
+    let mut twice = tetrahedron.clone();
+    twice.triangles.push([1, 0, 2]);
+    assert_eq!(check(&twice), 1);
+    // Another one at its tip, with a vertex of its own there: a touch, unless places are names.
+    let mut tip = tetrahedron;
+    tip.vertices.extend([[0.0, 0.0, 1.0], [1.0, 0.0, 2.0], [0.0, 1.0, 2.0]]);
+    tip.triangles.push([4, 5, 6]);
+    assert_eq!(tip.intersecting().len(), 3);
+    assert_eq!(check(&tip), 3);
+    let found = proof(&tip, false, 1 << 20, 1);
+    assert_eq!((found.intersecting_pairs, found.count(DefectKind::IntersectingTriangles)), (0, 0));
+    let told = proof(&tip, true, 1 << 20, 1);
+    let place = told.places.iter().find(|d| d.kind() == DefectKind::IntersectingTriangles);
+    assert_eq!(place.and_then(Defect::place), Some([0.5, 0.0, 1.0]));
+}
