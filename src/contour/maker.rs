@@ -30,7 +30,7 @@ impl Method {
 /// Makes the triangles of one brick after another, by one of the methods.
 pub enum Maker<'m> {
     /// Manifold dual contouring.
-    Mdc(Polygons<'m>),
+    Mdc(Box<Polygons<'m>>),
     /// Marching cubes.
     Mc(Triangles<'m>),
 }
@@ -47,7 +47,8 @@ impl<'m> Maker<'m> {
         match method {
             Method::Mdc | Method::Dc | Method::Dmc => {
                 let is_careful = method == Method::Mdc;
-                Self::Mdc(Polygons::new(cells, bases, domain, is_careful, with_corners))
+                let polygons = Polygons::new(cells, bases, domain, is_careful, with_corners);
+                Self::Mdc(Box::new(polygons))
             }
             Method::Mc => Self::Mc(Triangles::new(cells.first(), bases, domain, with_corners)),
         }

@@ -88,9 +88,9 @@ where
 /// The number of the first vertex of each brick, and their total.
 fn number_vertices(cells: &Layers) -> Result<Vec<u32>, StoreError> {
     let limit = u64::from(FAN_POINT) - 1;
-    let mut bases = Vec::with_capacity(cells.len() + 1);
+    let mut bases = Vec::with_capacity(cells.bricks() + 1);
     let mut total = 0_u64;
-    for number in 0..cells.len() {
+    for number in 0..cells.bricks() {
         bases.push(total as u32);
         total += u64::from(cells.flags(number) & VERTICES);
         if total > limit {
@@ -120,7 +120,7 @@ where
     /// Writes the vertices of the bricks that are left.
     fn vertices(&mut self) -> Result<(), WriteError<S::Error>> {
         let mut positions = Vec::new();
-        for number in (self.items as usize).min(self.cells.len())..self.cells.len() {
+        for number in (self.items as usize).min(self.cells.bricks())..self.cells.bricks() {
             if self.resources.monitor.cancelled() {
                 self.save()?;
                 return Err(StoreError::Cancelled.into());
@@ -168,7 +168,7 @@ where
     fn triangles(&mut self, bases: &[u32]) -> Result<(), WriteError<S::Error>> {
         let (cells, domain, resources) = (self.cells, self.domain, self.resources);
         let with_corners = self.sink.needs_corners();
-        let mut numbers = self.items as usize - cells.len()..cells.len();
+        let mut numbers = self.items as usize - cells.bricks()..cells.bricks();
         let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
         let (method, factors) = (self.method, self.method.factors());
         let factor = if with_corners { factors.with_corners } else { factors.plain };

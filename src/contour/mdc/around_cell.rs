@@ -149,7 +149,7 @@ impl AroundCell {
             Some(known) => self.is_torn |= known.point != point,
             None => {
                 let is_missed = !arc.passes(nb.cell_units());
-                let beyond = if face % 2 == 0 { arc.lower } else { arc.upper }.vertex.cut;
+                let beyond = if face % 2 == 1 { arc.upper } else { arc.lower }.vertex.cut;
                 let may_be_explicit = is_missed || (beyond.level() == 0 && beyond.is_multi());
                 self.arcs.push(CellArc { mine, other, face, point, is_missed, may_be_explicit });
             }

@@ -34,7 +34,7 @@ pub fn add(
     resources: &Resources,
 ) -> Result<BrickFile, ContourError> {
     let mut writer = BrickWriter::create(resources.scratch, SURFACE, resources.backing)?;
-    let mut numbers = (0..layers.len())
+    let mut numbers = (0..layers.bricks())
         .filter(|number| layers.is_anew(*number) || may_have_points(layers, *number));
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered_by_weight(

@@ -248,8 +248,10 @@ impl OwnPlanes {
         let mut own = Self { numbers: [0; 2], count: 0 };
         for &number in &around.normals[..around.count] {
             let normal = normals[number as usize];
-            let is_known =
-                own.numbers[..own.count].iter().any(|known| normals[*known as usize] == normal);
+            let is_known = own.numbers[..own.count].iter().any(|known| {
+                let known = normals[*known as usize];
+                known == normal || known == -normal
+            });
             if is_known || number == 0 {
                 continue;
             }

@@ -24,7 +24,7 @@ impl<'f> Layers<'f> {
     }
 
     /// The number of bricks.
-    pub fn len(&self) -> usize {
+    pub fn bricks(&self) -> usize {
         self.first.len()
     }
 

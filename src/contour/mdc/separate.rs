@@ -136,7 +136,7 @@ impl Separation<'_> {
         let resources = self.resources;
         let mut writer = BrickWriter::create(resources.scratch, name, resources.backing)?;
         let mut banned = Vec::new();
-        let mut numbers = (0..layers.len()).filter(|number| {
+        let mut numbers = (0..layers.bricks()).filter(|number| {
             let is_anew = before.is_some_and(|anew| anew.find(layers.key(*number).0).is_some());
             is_anew || (wanted[*number] && layers.flags(*number) & HAS_MULTI != 0)
         });
@@ -181,7 +181,7 @@ impl Separation<'_> {
         let name = LOOKS[turn % 2];
         let mut writer = BrickWriter::create(resources.scratch, name, resources.backing)?;
         let mut workspace = Workspace::new(self.domain, self.options);
-        for number in 0..layers.len() {
+        for number in 0..layers.bricks() {
             let key = layers.key(number);
             let more = banned.binary_search_by_key(&number, |(number, _)| *number).ok();
             let Some(more) = more.map(|at| &banned[at].1) else {
@@ -306,7 +306,8 @@ fn decide(
         Look::Second => around.is_near_flagged,
     };
     let keeps_flag = was_flagged && look != Look::Second;
-    if !keeps_flag && !(may_clash && clash(&around, AroundCell::variants)) {
+    let is_clash = keeps_flag || (may_clash && clash(&around, AroundCell::variants));
+    if !is_clash {
         return Ok(Decision::Sound);
     }
     match look {
