@@ -63,6 +63,9 @@ impl Workspace {
         around: &Around,
         solution: &Solution,
     ) -> Result<Option<(DVec3, [u32; 2])>, ContourError> {
+        if self.is_smooth && at.iter().all(|c| (1..SIDE - 1).contains(c)) {
+            return Ok(None);
+        }
         let Some(own) = OwnPlanes::of(around, solution, &self.normals) else { return Ok(None) };
         let mut planes = Planes { numbers: [0; MAX_PLANES], count: 0 };
         for corner in 0..8_usize {

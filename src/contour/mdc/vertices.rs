@@ -129,6 +129,8 @@ pub struct Workspace {
     leaves: Leaves,
     /// Cosine of the crease angle.
     pub(super) crease_cosine: f64,
+    /// Whether no two planes of the brick differ by more than the crease angle.
+    pub(super) is_smooth: bool,
     pub(super) halo: Halo,
     /// Corner signs of bricks beyond a side, for faces that two bricks must agree on.
     beyond: HashMap<u64, CornerBits>,
@@ -162,6 +164,7 @@ impl Workspace {
             leaves: Leaves::default(),
             // The cut-off is tan² of half the angle.
             crease_cosine: (1.0 - qef.cutoff()) / (1.0 + qef.cutoff()),
+            is_smooth: false,
             halo: Halo::new(),
             beyond: HashMap::new(),
         }
@@ -218,6 +221,7 @@ impl Workspace {
         self.normals.clear();
         self.normals.push(DVec3::ZERO);
         self.normals.extend(self.planes.iter().map(SourcePlane::unit_normal));
+        self.is_smooth = self.spans_less_than_a_crease();
         for crossing in record.crossings.iter() {
             let (edge, plane) = (crossing.edge.to_native(), crossing.plane.to_native());
             self.marks.set(edge);
@@ -240,6 +244,14 @@ impl Workspace {
         if self.clustering.is_some() {
             self.begin_leaves();
         }
+    }
+
+    /// Whether all normals of the brick are within half the crease angle of the first.
+    fn spans_less_than_a_crease(&self) -> bool {
+        // The cut-off is tan² of half the angle.
+        let cosine_squared = 1.0 / (1.0 + self.qef.cutoff());
+        let Some(first) = self.normals.get(1) else { return true };
+        self.normals[1..].iter().all(|normal| normal.dot(*first).powi(2) >= cosine_squared)
     }
 
     /// The planes of the brick in cells; no leaf yet.
