@@ -127,7 +127,7 @@ impl ContourError {
 }
 
 /// Counts of contouring.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContourStats {
     /// Cells with at least one vertex.
     pub cells: u64,
@@ -141,12 +141,17 @@ pub struct ContourStats {
     pub clamped_vertices: u64,
     /// Vertices on creases or corners that their cells' own edges do not see.
     pub feature_vertices: u64,
+    /// Edges of the grid that the surface crosses; without clusters each gives two triangles, and
+    /// four where it is drawn as a fan.
+    pub crossed_edges: u64,
     /// Cells of the octree that became one vertex, or several.
     pub clusters: u64,
     /// Cells that did not because a vertex would lie too far from a plane.
     pub refused_by_error: u64,
     /// Cells that did not because of the shape of the surface in them.
     pub refused_by_shape: u64,
+    /// Largest distance of a cluster's vertex to a plane that it stands for, cells.
+    pub cluster_error_cells: f64,
     /// Vertices in clusters and in cells that no cluster covers.
     pub cut_vertices: u64,
     /// Cells whose face points are vertices, so that the surfaces in them stay apart.
@@ -159,13 +164,51 @@ pub struct ContourStats {
     pub polygons: u64,
     /// Polygons drawn as a fan around their crossing.
     pub fans: u64,
+    /// Smallest angle of all triangles, degrees; 180 without triangles.
+    pub least_angle_deg: f64,
+    /// Sum over the triangles of the smallest angle of each, degrees.
+    pub sum_of_least_angles_deg: f64,
     /// Triangles written.
     pub triangles: u64,
     /// Vertices written.
     pub vertices: u64,
 }
 
+impl Default for ContourStats {
+    fn default() -> Self {
+        Self {
+            cells: 0,
+            multi_cells: 0,
+            flipped_faces: 0,
+            cell_vertices: 0,
+            clamped_vertices: 0,
+            feature_vertices: 0,
+            crossed_edges: 0,
+            clusters: 0,
+            refused_by_error: 0,
+            refused_by_shape: 0,
+            cluster_error_cells: 0.0,
+            cut_vertices: 0,
+            flagged_cells: 0,
+            split_clusters: 0,
+            face_points: 0,
+            polygons: 0,
+            fans: 0,
+            least_angle_deg: 180.0,
+            sum_of_least_angles_deg: 0.0,
+            triangles: 0,
+            vertices: 0,
+        }
+    }
+}
+
 impl ContourStats {
+    /// The mean over the triangles of the smallest angle of each, degrees.
+    #[must_use]
+    pub fn mean_least_angle_deg(&self) -> f64 {
+        self.sum_of_least_angles_deg / self.triangles.max(1) as f64
+    }
+
     /// Adds the counts of a brick; what the written file has in all is not added.
     fn add(&mut self, other: &Self) {
         self.cells += other.cells;
@@ -173,6 +216,10 @@ impl ContourStats {
         self.flipped_faces += other.flipped_faces;
         self.cell_vertices += other.cell_vertices;
         self.clamped_vertices += other.clamped_vertices;
+        self.crossed_edges += other.crossed_edges;
+        self.cluster_error_cells = self.cluster_error_cells.max(other.cluster_error_cells);
+        self.least_angle_deg = self.least_angle_deg.min(other.least_angle_deg);
+        self.sum_of_least_angles_deg += other.sum_of_least_angles_deg;
         self.feature_vertices += other.feature_vertices;
         self.clusters += other.clusters;
         self.refused_by_error += other.refused_by_error;

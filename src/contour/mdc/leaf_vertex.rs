@@ -64,11 +64,10 @@ impl Workspace {
         &mut self,
         place: Place,
         at: [usize; 3],
-        edges: u16,
+        around: &Around,
         brick: &mut CellBrick,
         stats: &mut ContourStats,
     ) -> Result<(), ContourError> {
-        let around = self.around(at, edges);
         let attempt = match around.flat_normal() {
             Some(normal) => {
                 let normal = self.normals[normal as usize];
@@ -83,7 +82,7 @@ impl Workspace {
         match attempt {
             Attempt::Done(solution) => {
                 let mut position = solution.position;
-                if let Some((met, planes)) = self.toward_feature(place, at, &around, &solution)? {
+                if let Some((met, planes)) = self.toward_feature(place, at, around, &solution)? {
                     position = met;
                     self.take_in(planes, at, met);
                     stats.feature_vertices += 1;

@@ -9,6 +9,7 @@
 
 pub mod table;
 
+mod angles;
 mod arcs;
 mod around_cell;
 mod cell;

@@ -3,6 +3,7 @@
 //! A brick owns the edges that leave the min corners of its cells; the cells around such an edge
 //! lie in the brick and its seven lower neighbours, all of which come earlier in Morton order.
 
+use crate::contour::mdc::angles::Angles;
 use crate::contour::mdc::arcs::{Edge, Polygon};
 use crate::contour::mdc::cell::{cell_mask, cell_number, place_of};
 use crate::contour::mdc::layers::Layers;
@@ -24,6 +25,8 @@ pub struct BrickTriangles {
     pub fan_points: Vec<[f64; 3]>,
     /// Counts.
     pub stats: ContourStats,
+    /// The smallest angle so far.
+    angles: Angles,
 }
 
 /// A vertex number with this bit is the brick's own fan point.
@@ -133,6 +136,7 @@ impl<'p> Polygons<'p> {
                 self.draw(edge, offset, mask & 1 == 1, &mut out)?;
             }
         }
+        out.stats.least_angle_deg = out.angles.least_deg();
         Ok(out)
     }
 
@@ -237,6 +241,8 @@ impl<'p> Polygons<'p> {
             if !inside_below {
                 triangle.swap(1, 2);
             }
+            let positions = triangle.map(|corner| corner.position);
+            out.stats.sum_of_least_angles_deg += out.angles.note(positions);
             out.indices.push(triangle.map(|corner| corner.number));
             if self.with_corners {
                 out.corners.push(triangle.map(|corner| self.nb.to_model(corner.position)));

@@ -14,7 +14,7 @@ use crate::contour::mdc::cluster::{
     CellPlane, ClusterOptions, Clustering, JUDGES_ONLY, Leaves, PlaneHit,
 };
 use crate::contour::mdc::features::{Halo, Place};
-use crate::contour::mdc::leaf_vertex::WaitingCells;
+use crate::contour::mdc::leaf_vertex::{Around, WaitingCells};
 use crate::contour::mdc::table::{NO_FACE, TWO_SIDED};
 use crate::contour::mdc::{INSET_UNITS, flags_of};
 use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method};
@@ -204,7 +204,9 @@ impl Workspace {
             clustering.cut(&mut brick, &self.leaves);
             stats.refused_by_error += clustering.refusals.by_error;
             stats.refused_by_shape += clustering.refusals.by_shape;
+            stats.cluster_error_cells = clustering.refusals.largest_error;
         }
+        stats.crossed_edges += brick.offsets.len() as u64;
         stats.clusters += brick.clusters.len() as u64;
         stats.cut_vertices += brick.positions.len() as u64;
         Ok((brick, stats))
@@ -285,26 +287,22 @@ impl Workspace {
         }
     }
 
-    /// Adds the components of a cell to the leaves, before their vertices are placed.
-    fn add_leaf(&mut self, at: [usize; 3], mask: u8, edge_masks: &[u16], first: usize) {
-        self.leaves.components.push(first as u32);
+    /// Adds a component of a cell to the leaves, before its vertex is placed.
+    fn add_leaf(&mut self, at: [usize; 3], mask: u8, around: &Around) {
         let low = DVec3::from(at.map(|c| c as f64)) + 0.5;
-        for &edges in edge_masks {
-            self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
-            let around = self.around(at, edges);
-            for i in 0..around.count {
-                let point = around.points[i] + low;
-                let plane = match around.normals[i] {
-                    0 => {
-                        // A patch has no plane: the signs around tell how the surface faces.
-                        let normal = gradient(mask);
-                        self.leaves.planes.push(CellPlane { normal, offset: normal.dot(point) });
-                        (self.leaves.planes.len() - 1) as u32 | JUDGES_ONLY
-                    }
-                    normal => normal - 1,
-                };
-                self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
-            }
+        self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
+        for i in 0..around.count {
+            let point = around.points[i] + low;
+            let plane = match around.normals[i] {
+                0 => {
+                    // A patch has no plane: the signs around tell how the surface faces.
+                    let normal = gradient(mask);
+                    self.leaves.planes.push(CellPlane { normal, offset: normal.dot(point) });
+                    (self.leaves.planes.len() - 1) as u32 | JUDGES_ONLY
+                }
+                normal => normal - 1,
+            };
+            self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
         }
     }
 
@@ -342,15 +340,25 @@ impl Workspace {
         }
         let components = components_of(cell);
         let masks = &components.edge_masks[..usize::from(components.count)];
-        if self.clustering.is_some() {
-            self.add_leaf(at, mask, masks, brick.positions.len());
+        let is_clustering = self.clustering.is_some();
+        if is_clustering {
+            self.leaves.components.push(brick.positions.len() as u32);
         }
         if self.method == Method::Dmc {
             self.place_in_middle(at, masks, brick);
         } else if components.count == 1 {
-            let place = Place { signs, key };
-            self.place_alone(place, at, components.edge_masks[0], brick, stats)?;
+            let around = self.around(at, components.edge_masks[0]);
+            if is_clustering {
+                self.add_leaf(at, mask, &around);
+            }
+            self.place_alone(Place { signs, key }, at, &around, brick, stats)?;
         } else {
+            if is_clustering {
+                for &edges in masks {
+                    let around = self.around(at, edges);
+                    self.add_leaf(at, mask, &around);
+                }
+            }
             self.place_apart(at, masks, brick, stats);
         }
         for axis in 0..3 {

@@ -64,12 +64,14 @@ pub struct Leaves {
 }
 
 /// Why pieces of surface are not one vertex.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Refusals {
     /// Cells in which a vertex would lie too far from a plane, or there are too many planes.
     pub by_error: u64,
     /// Cells in which a piece is no disk, or meets a face more than once.
     pub by_shape: u64,
+    /// Largest distance of a vertex to a plane of its cluster.
+    pub largest_error: f64,
 }
 
 /// Makes the cut of one brick after another.
@@ -336,12 +338,15 @@ impl Clustering {
         }
         let mut placed = std::mem::take(&mut cut.placed);
         placed.clear();
+        let mut largest = 0.0_f64;
         let fits = (first_node..self.nodes.len()).all(|node| {
             let vertex = self.place(cut, cell, node);
-            placed.extend(vertex);
+            placed.extend(vertex.map(|(vertex, _)| vertex));
+            largest = vertex.map_or(largest, |(_, error)| largest.max(error));
             vertex.is_some()
         });
         if fits && !cut.is_banned(cell) {
+            self.refusals.largest_error = self.refusals.largest_error.max(largest);
             cut.collapse(cell, mark, &placed, &self.node_of, first_node);
         }
         cut.placed = placed;
@@ -378,8 +383,9 @@ impl Clustering {
         })
     }
 
-    /// The vertex of a piece on the lattice; `None` if it lies too far from a plane.
-    fn place(&self, cut: &Cut, cell: &Cell, number: usize) -> Option<[i32; 3]> {
+    /// The vertex of a piece on the lattice, and its largest distance to a plane; `None` if that is
+    /// beyond the threshold.
+    fn place(&self, cut: &Cut, cell: &Cell, number: usize) -> Option<([i32; 3], f64)> {
         let node = &self.nodes[number];
         let ClusterOptions { cell_units, inset_units, .. } = self.options;
         let size = (1 << cell.level) as f64;
@@ -405,13 +411,16 @@ impl Clustering {
         });
         let at = DVec3::from(vertex.map(f64::from)) / cell_units as f64;
         let threshold = self.options.threshold_cells;
-        let mut components = cut.components_in(&cell.leaves);
-        components
-            .all(|component| {
-                self.node_of[component] as usize != number
-                    || largest_distance(cut.hits_of(component), planes, at) <= threshold
-            })
-            .then_some(vertex)
+        let mut largest = 0.0_f64;
+        for component in cut.components_in(&cell.leaves) {
+            if self.node_of[component] as usize == number {
+                largest = largest.max(largest_distance(cut.hits_of(component), planes, at));
+                if largest > threshold {
+                    return None;
+                }
+            }
+        }
+        Some((vertex, largest))
     }
 }
 
