@@ -8,7 +8,7 @@ use brickmend::repair::{Outcome, Settings};
 use brickmend::sign::FillRule;
 use glam::{DMat3, DVec3};
 
-use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
+use crate::support::run::{Encoding, Workshop, at_depth, repair_soup, unclustered};
 use crate::support::soups::{specks, turned_cube};
 use crate::support::surface::Surface;
 
@@ -175,4 +175,58 @@ fn the_place_in_the_grid_does_not_change_the_volume() {
 fn shapes_are_what_these_tests_take_them_for() {
     assert!((volume(&overlapping_boxes()) - 2.0).abs() < 1e-12);
     assert!(volume(&specks()) > 0.0);
+}
+
+#[test]
+fn a_lip_of_a_cell_on_a_large_plate_survives_clustering() {
+    // 220 cells long at depth 8; the lip is a cell high and ten wide.
+    let cell = 1.0 / 220.0;
+    let (plate, lip) = (0.1, 0.1 + cell);
+    let mut soup = cuboid([0.0; 3], [1.0, 1.0, plate]);
+    soup.extend(cuboid([1.0 - 10.0 * cell, 1.0 - 10.0 * cell, 0.5 * plate], [1.0, 1.0, lip]));
+    let (outcome, surface) = repair_soup(&soup, &at_depth(8)).expect("a result");
+    let step = 2.0_f64.powi(outcome.grid.unit_exponent);
+    let on_lip = surface.vertices.iter().filter(|v| (v[2] - lip).abs() <= step);
+    let far = on_lip.clone().filter(|v| (v[0] - 1.0).abs() <= step && (v[1] - 1.0).abs() <= step);
+    assert!(on_lip.count() >= 4, "the lip is there");
+    assert_eq!(far.count(), 1, "with its corner");
+    let volume = plate + 100.0 * cell * cell * cell;
+    assert!((surface.proof.volume - volume).abs() < 1e-5 * volume, "{}", surface.proof.volume);
+    let leaves = outcome.output.contour.crossed_edges * 2;
+    assert!(surface.proof.triangles * 50 < leaves, "{} of {leaves}", surface.proof.triangles);
+}
+
+#[test]
+fn no_clustering_gives_every_leaf_its_vertices() {
+    let soup = sphere([0.0; 3], 1.0, 24);
+    let (outcome, surface) = repair_soup(&soup, &unclustered(6)).expect("a result");
+    let contour = outcome.output.contour;
+    assert_eq!((contour.clusters, contour.face_points), (0, 0));
+    assert_eq!(contour.cut_vertices, contour.cell_vertices);
+    assert_eq!(contour.polygons, contour.crossed_edges);
+    assert_eq!(surface.proof.triangles, 2 * (contour.polygons + contour.fans));
+    let (clustered, lighter) = repair_soup(&soup, &at_depth(6)).expect("a result");
+    assert!(clustered.output.contour.cluster_error_cells <= 0.1);
+    assert!(lighter.proof.triangles < surface.proof.triangles);
+    assert_eq!(lighter.proof.euler_characteristic, surface.proof.euler_characteristic);
+}
+
+#[test]
+fn clusters_lose_no_corner_of_a_turned_cube() {
+    let mut random = Random::new(22);
+    for pose in 0..10 {
+        let (soup, turn, by) = turned_cube(&mut random);
+        let sharp = |settings| {
+            let (outcome, surface) = repair_soup(&soup, settings).expect("a result");
+            let is_sharp = |bits: &i32| {
+                let sign = |bit: i32| if bits & bit == 0 { -1.0 } else { 1.0 };
+                let corner = turn * DVec3::new(sign(1), sign(2), sign(4)) + by;
+                let near = |v: &[f64; 3]| DVec3::from(*v).distance(corner) / outcome.cell_size;
+                surface.vertices.iter().map(near).fold(f64::INFINITY, f64::min) < 1e-3
+            };
+            (0..8).filter(is_sharp).collect::<Vec<i32>>()
+        };
+        let (before, after) = (sharp(&unclustered(6)), sharp(&at_depth(6)));
+        assert!(before.iter().all(|corner| after.contains(corner)), "{pose}: {before:?} {after:?}");
+    }
 }
