@@ -12,7 +12,7 @@ use crate::contour::mdc::table::{axis_of_edge, corner_of_edge};
 use crate::contour::mdc::vertices::Workspace;
 use crate::contour::{ContourError, ContourStats};
 use crate::geom::qef::{
-    Attempt, Hit, QefOptions, Waiting, begin, solve, solve_flat, solve_together,
+    Attempt, Hit, QefOptions, Waiting, begin, solve, solve_flat, solve_smooth, solve_together,
 };
 use crate::octree::CellBrick;
 
@@ -72,6 +72,10 @@ impl Workspace {
             Some(normal) => {
                 let normal = self.normals[normal as usize];
                 solve_flat(around.points(), normal, &self.qef).map(Attempt::Done)
+            }
+            None if self.is_smooth => {
+                let hits = around.hits(&self.normals);
+                solve_smooth(&hits[..around.count], &self.qef).map(Attempt::Done)
             }
             None => None,
         };

@@ -1,7 +1,7 @@
 //! The choice among the paths, and the box.
 
 use crate::geom::qef::bounded::minimise;
-use crate::geom::qef::jacobi::Spectrum;
+use crate::geom::qef::jacobi::{Spectrum, apply};
 use crate::geom::qef::ldl;
 use crate::geom::qef::planes::{Bundle, is_full_rank, is_usable, with_exact_coordinates};
 use crate::geom::qef::{Hit, Path, Qef, QefOptions, Solution};
@@ -72,6 +72,40 @@ pub fn solve_flat(points: &[DVec3], unit_normal: DVec3, options: &QefOptions) ->
         position,
         rank,
         path: Path::Plane,
+        clamped: false,
+    })
+}
+
+/// Steps to the largest eigenvalue's vector: each takes away all but the cut-off of what is wrong.
+const POWER_STEPS: usize = 4;
+
+/// Places the vertex of a cell whose normals differ by less than the crease angle, up to sign: the
+/// same as [`begin`] up to rounding, sooner. `None` where it is not surely that.
+#[inline]
+#[must_use]
+pub fn solve_smooth(hits: &[Hit], options: &QefOptions) -> Option<Solution> {
+    let mut qef = Qef::default();
+    for hit in hits {
+        // Planes across an axis keep their coordinate: that is for the other paths.
+        if !is_usable(hit.normal) || hit.normal.abs().max_element() == 1.0 {
+            return None;
+        }
+        qef.add_plane(hit.point, hit.normal);
+    }
+    let m = qef.mass_point();
+    let mut along = hits[0].normal;
+    let mut grown = along;
+    for _ in 0..POWER_STEPS {
+        grown = apply(&qef.ata, along);
+        along = grown * grown.length_squared().sqrt().recip();
+    }
+    // Of unit length before the last step, so that grew by the eigenvalue.
+    let largest = grown.length_squared().sqrt();
+    let position = m + along * (along.dot(qef.residual(m)) / largest);
+    contains(options, position).then_some(Solution {
+        position,
+        rank: 1,
+        path: Path::Jacobi,
         clamped: false,
     })
 }

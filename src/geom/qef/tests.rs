@@ -323,3 +323,28 @@ proptest! {
         prop_assert!(on_the_cut || rank == usize::from(solution.rank));
     }
 }
+
+#[test]
+fn smooth_cells_are_solved_as_by_eigenvalues() {
+    let mut dice = Dice(9);
+    let options = QefOptions::default();
+    let mut solved = 0;
+    for _ in 0..2000 {
+        let axis = dice.vector().normalize_or(DVec3::X);
+        let count = 4 + (dice.roll() * 6.0) as usize;
+        let hits: Vec<Hit> = (0..count)
+            .map(|_| {
+                let tilt = dice.vector() * 0.1;
+                let normal = (axis + tilt).normalize() * if dice.roll() < 0.5 { 1.0 } else { -1.0 };
+                Hit { point: dice.vector() * 0.6, normal }
+            })
+            .collect();
+        let Some(fast) = solve_smooth(&hits, &options) else { continue };
+        let expected = solve(&hits, &options);
+        if !expected.clamped && expected.rank == 1 {
+            assert!((fast.position - expected.position).length() < 1e-6, "{fast:?} {expected:?}");
+            solved += 1;
+        }
+    }
+    assert!(solved > 1000, "{solved}");
+}
