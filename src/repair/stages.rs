@@ -11,13 +11,14 @@ use crate::ingest::{
     read_soup, settle,
 };
 use crate::io::{ReadOptions, check_output};
-use crate::mesh::SinkStats;
+use crate::mesh::{SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::{BrickKey, Domain, DropRecord, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
+use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
@@ -25,6 +26,15 @@ use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, SpoolPeek, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
+
+/// A level of detail whose file is in its place.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FinishedLevel {
+    /// What came of it.
+    pub outcome: Outcome,
+    /// The file.
+    pub file: SinkFile,
+}
 
 /// What the finished steps found out; a checkpoint remembers it besides the files.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -43,9 +53,16 @@ pub struct Findings {
     pub contour: ContourStats,
     pub written: SinkStats,
     pub proof: Option<Proof>,
+    /// The levels before the one under way.
+    pub finished: Vec<FinishedLevel>,
 }
 
 impl Findings {
+    /// Nothing but the levels that are in place.
+    pub fn after(finished: Vec<FinishedLevel>) -> Self {
+        Self { finished, ..Self::default() }
+    }
+
     /// What was found out about the input.
     pub fn soup(&self) -> &SoupFacts {
         self.soup.as_ref().expect("the input is read first")
@@ -146,7 +163,7 @@ impl Run<'_> {
         }
         let (depth, bounds) = (self.settings.depth, &soup.facts.bounds);
         let domain = choose_domain(self.input, bounds, depth, self.format)?;
-        if self.settings.decimate.in_cells(bounds, &domain).is_none() {
+        if self.levels().iter().any(|level| level.decimate.in_cells(bounds, &domain).is_none()) {
             return Err(RepairError::NoUnit { path: self.input.to_path_buf() });
         }
         findings.domain = Some(domain);
@@ -209,7 +226,7 @@ impl Run<'_> {
 
     fn contour_options(&self, findings: &Findings) -> ContourOptions {
         let bounds = &findings.soup().bounds;
-        let decimate_cells = self.settings.decimate.in_cells(bounds, findings.domain());
+        let decimate_cells = self.level(findings).decimate.in_cells(bounds, findings.domain());
         ContourOptions {
             method: self.settings.method,
             crease_deg: self.settings.crease_deg,
@@ -246,7 +263,9 @@ impl Run<'_> {
             separate(signs, cells, domain, &options, &findings.contour, resources)
                 .map_err(RepairError::Contour)?;
         findings.contour = stats;
-        handles.signs = None;
+        if !self.has_more_levels(findings) {
+            handles.signs = None;
+        }
         Ok(hand_on(surface, &mut handles.surface))
     }
 

@@ -77,6 +77,19 @@ pub struct Estimate {
     pub threads: usize,
 }
 
+impl Estimate {
+    /// [`Estimate::disk_bytes`] for so many levels of detail: their files are there together, and
+    /// the signs until the last one.
+    #[must_use]
+    pub fn disk_bytes_with_levels(&self, levels: u64) -> u64 {
+        let Some(before) = levels.checked_sub(1).filter(|before| *before > 0) else {
+            return self.disk_bytes;
+        };
+        let signs = self.disk.relabel - self.disk.flood + 1;
+        self.disk.peak().max(self.disk.prove + signs) + before * self.output_bytes
+    }
+}
+
 /// Predicts what [`crate::repair::repair`] would take to write `format`.
 ///
 /// Reads the input once. What the reader spills lies in the folder that `limits` names for work,
