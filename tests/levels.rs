@@ -1,4 +1,4 @@
-//! Levels of detail: one run, one file for each threshold, the same as a run for each.
+//! Thresholds of decimation: one file for each from one run, and the one that gives few triangles.
 
 mod support;
 
@@ -13,7 +13,8 @@ use brickmend::io::Format;
 use brickmend::mesh::shapes::{Random, sphere};
 use brickmend::monitor::{Counter, Monitor, Void};
 use brickmend::repair::{
-    Blame, Levels, Limits, Outcome, Reach, RepairError, Settings, estimate, repair, repair_levels,
+    Blame, Depth, Levels, Limits, Outcome, Reach, RepairError, Settings, estimate, repair,
+    repair_levels,
 };
 use brickmend::store::Backing;
 use tempfile::TempDir;
@@ -260,4 +261,111 @@ fn levels_that_cannot_be_are_refused_before_work() {
     let error = try_with(&input, &settings, LEVELS).expect_err("the input itself");
     assert!(matches!(error, RepairError::OutputIsInput { .. }), "{error}");
     assert_eq!(error.blame(), Blame::Usage);
+}
+
+/// Repairs into `out.ply` in `folder` with at most so many triangles.
+fn run_at_most(
+    folder: &Path,
+    input: &Path,
+    triangles: u64,
+    limits: &Limits,
+    monitor: &dyn Monitor,
+) -> Result<(Outcome, Vec<u8>), RepairError> {
+    let settings = Settings { max_triangles: Some(triangles), ..at_depth(DEPTH) };
+    let output = folder.join("out.ply");
+    let outcome = repair(input, &output, Format::Ply, &settings, limits, monitor)?;
+    assert_eq!(std::fs::read_dir(folder).expect("readable").count(), 1, "something is left over");
+    Ok((outcome, std::fs::read(output).expect("the output")))
+}
+
+#[test]
+fn a_surface_has_no_more_triangles_than_asked_for_and_the_next_finer_threshold_gives_more() {
+    let model = broken_sphere();
+    let at = |cells| {
+        let settings = Settings { decimate: Reach::Cells(cells), ..at_depth(DEPTH) };
+        let limits = Limits::default();
+        model.workshop.repair(&model.path, "ply", &settings, &limits).expect("a result")
+    };
+    let usual = at(0.1).outcome.output.proof.triangles;
+    let fewest = at(900.0).outcome.output.proof.triangles;
+    assert!(3 * fewest < usual, "{fewest} of {usual}");
+    for limit in [usual - 1, (usual + fewest) / 2, fewest + 10] {
+        let folder = TempDir::new().expect("a temporary folder");
+        let result = run_at_most(folder.path(), &model.path, limit, &limits(), &Void);
+        let (outcome, bytes) = result.expect("a result");
+        let cells = outcome.output.decimate_cells;
+        assert!(outcome.output.proof.triangles <= limit, "{limit}: {cells}");
+        assert!(cells > 0.1, "{limit}: {cells}");
+        assert!(bytes == std::fs::read(at(cells).path).expect("a file"), "{limit}: other bytes");
+        let finer = at(cells / 2_f64.powf(0.25)).outcome.output.proof.triangles;
+        assert!(finer > limit, "{limit}: {finer} triangles at the next finer threshold");
+        let settings = Settings { max_triangles: Some(limit), ..at_depth(DEPTH) };
+        let told = estimate(&model.path, Format::Ply, &settings, &limits(), &Void).expect("sums");
+        assert!(outcome.disk.peak_bytes <= told.disk_bytes, "{limit}: {:?}", outcome.disk);
+        assert!(told.disk.choose > told.disk.place.max(told.disk.separate));
+    }
+    let folder = TempDir::new().expect("a temporary folder");
+    let result = run_at_most(folder.path(), &model.path, usual, &limits(), &Void);
+    let (outcome, bytes) = result.expect("a result");
+    assert_eq!(outcome.output.decimate_cells, 0.1, "what fits is left as it is");
+    assert!(bytes == std::fs::read(at(0.1).path).expect("a file"));
+}
+
+#[test]
+fn a_choice_that_is_killed_ends_with_the_same_file_and_one_that_is_made_is_kept() {
+    let model = broken_sphere();
+    let folder = TempDir::new().expect("a temporary folder");
+    let photographer = Photographer { folder: folder.path(), images: Mutex::default() };
+    let result = run_at_most(folder.path(), &model.path, 4000, &limits(), &photographer);
+    let (whole, expected) = result.expect("a result");
+    let images = photographer.images.into_inner().expect("no test panicked");
+    let trials = images.iter().filter(|(moment, _)| moment.contains("triangles at"));
+    assert!((3..=9).contains(&trials.count()));
+    let chosen = images.iter().position(|(moment, _)| moment == "choose 0").expect("a choice");
+    for (number, (moment, image)) in images.iter().enumerate().skip(chosen.saturating_sub(12)) {
+        let notes = Photographer { folder: folder.path(), images: Mutex::default() };
+        let limits = Limits { threads: 1 + number % 3, ..limits() };
+        let result = run_at_most(image.path(), &model.path, 4000, &limits, &notes);
+        let (outcome, bytes) = result.expect("it goes on");
+        assert!(bytes == expected, "{moment}: other bytes");
+        assert_eq!(outcome.output.decimate_cells, whole.output.decimate_cells, "{moment}");
+        assert_eq!(outcome.resume.resumptions, 1, "{moment}");
+        let notes = notes.images.into_inner().expect("no test panicked");
+        let tried = notes.iter().any(|(moment, _)| moment.contains("triangles at"));
+        assert_eq!(tried, number < chosen, "{moment}: a choice that is made is made once");
+    }
+}
+
+#[test]
+fn more_triangles_than_any_threshold_leaves_are_refused_with_the_fewest() {
+    let model = broken_sphere();
+    let folder = TempDir::new().expect("a temporary folder");
+    let error = run_at_most(folder.path(), &model.path, 4, &limits(), &Void).expect_err("refused");
+    assert_eq!(error.blame(), Blame::Usage);
+    let RepairError::TooManyTriangles { limit: 4, fewest } = error else { panic!("{error}") };
+    let left = std::fs::read_dir(folder.path()).expect("readable").count();
+    assert_eq!(left, 0, "something is left over");
+    let coarse = Settings { depth: Depth::Levels(DEPTH - 1), ..at_depth(DEPTH) };
+    let coarse = Settings { max_triangles: Some(fewest), ..coarse };
+    let limits = Limits::default();
+    let coarse = model.workshop.repair(&model.path, "ply", &coarse, &limits).expect("a result");
+    assert!(coarse.outcome.output.proof.triangles <= fewest);
+    let mc = Settings { method: Method::Mc, max_triangles: Some(fewest), ..at_depth(DEPTH) };
+    let error = model.workshop.repair(&model.path, "ply", &mc, &limits).err().expect("refused");
+    assert!(matches!(error, RepairError::NothingToMerge { .. }), "{error}");
+}
+
+#[test]
+fn every_level_has_no_more_triangles_than_asked_for() {
+    let model = broken_sphere();
+    let folder = TempDir::new().expect("a temporary folder");
+    let output = folder.path().join("out.ply");
+    let settings = Settings { max_triangles: Some(4000), ..at_depth(DEPTH) };
+    let levels = levels("0,4cells");
+    let outcomes =
+        repair_levels(&model.path, &output, Format::Ply, &settings, &levels, &limits(), &Void);
+    let outcomes = outcomes.expect("a result");
+    assert!(outcomes.iter().all(|outcome| outcome.output.proof.triangles <= 4000));
+    let cells: Vec<f64> = outcomes.iter().map(|outcome| outcome.output.decimate_cells).collect();
+    assert!(cells[0] > 0.0 && cells[0] < 4.0 && cells[1] == 4.0, "{cells:?}");
 }

@@ -31,7 +31,7 @@ pub struct RepairArguments {
     /// Levels of detail: one file for each of these values of --decimate, such as
     /// 0,0.1,0.5,2cells, from one run; for -o out.ply they are out.0cells.ply, out.0.1cells.ply and
     /// so on.
-    #[arg(long, value_name = "LENGTHS", conflicts_with_all = ["decimate", "preview"],
+    #[arg(long, value_name = "LENGTHS", conflicts_with_all = ["decimate", "max_triangles", "preview"],
           help_heading = "Result")]
     lod: Option<Levels>,
     #[command(flatten)]

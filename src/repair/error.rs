@@ -85,6 +85,17 @@ pub enum RepairError {
         /// What asked for it.
         option: &'static str,
     },
+    /// No threshold gives as few triangles as were asked for.
+    #[error(
+        "At most {limit} triangles were asked for, and the surface has {fewest} at the least, \
+         however many cells are merged; a smaller --depth gives fewer"
+    )]
+    TooManyTriangles {
+        /// What was asked for.
+        limit: u64,
+        /// The fewest that were found.
+        fewest: u64,
+    },
     /// A length with a unit for a file without one.
     #[error("{path} states no unit, so a length in metres means nothing; give model units or %")]
     NoUnit {
@@ -196,6 +207,7 @@ impl RepairError {
             | Self::InputInWorkFolder { .. }
             | Self::SameLevel { .. }
             | Self::NothingToMerge { .. }
+            | Self::TooManyTriangles { .. }
             | Self::NoUnit { .. }
             | Self::OutputTooCoarse { .. } => Blame::Usage,
             Self::EmptyResult { .. } => Blame::Model,

@@ -25,7 +25,7 @@ pub fn conclude(
     findings: &Findings,
     rebuilt: &[String],
 ) -> Outcome {
-    let level = run.level(findings);
+    let (level, options) = (run.level(findings), run.contour_options(findings));
     let domain = *findings.domain();
     let soup = *findings.soup();
     let proof = findings.proof.clone().unwrap_or_default();
@@ -72,6 +72,7 @@ pub fn conclude(
             bytes: findings.written.file.bytes,
             proof,
             area_ratio,
+            decimate_cells: options.merged_cells(),
             contour: findings.contour,
             caveat: run.settings.method.caveat().map(str::to_owned),
         },

@@ -7,6 +7,7 @@
 //! Memory:     [`Limits::max_memory_bytes`], shared out by one accountant.
 //! Fails:      [`RepairError`], one message with place, and the work folder kept or removed.
 
+mod choose;
 mod depth;
 mod error;
 mod estimate;

@@ -93,6 +93,7 @@ fn run(
     monitor: &dyn Monitor,
 ) -> Result<Vec<Outcome>, RepairError> {
     let Work { input, output, format, settings, levels } = work;
+    settings.check()?;
     let plan = MemoryPlan::within(limits)?;
     crate::io::detect(input).map_err(RepairError::Input)?;
     levels.iter().try_for_each(|level| keep_input(input, &level.output))?;
@@ -288,7 +289,7 @@ impl Run<'_> {
                 return Ok(self.outcomes(findings, outcome));
             }
             findings.finished.push(FinishedLevel { outcome, file: findings.written.file });
-            workspace.go_back_to(Step::Place, to_text(&findings))?;
+            workspace.go_back_to(Step::Choose, to_text(&findings))?;
         }
     }
 
@@ -332,7 +333,7 @@ impl Run<'_> {
             return Ok(());
         };
         findings.finished.truncate(lost);
-        Ok(workspace.go_back_to(Step::Place, to_text(findings))?)
+        Ok(workspace.go_back_to(Step::Choose, to_text(findings))?)
     }
 
     /// Brings the counters up to what moved so far.
@@ -374,7 +375,7 @@ impl Run<'_> {
             };
             let files = self.step(step, workspace, findings, handles, &resources)?;
             // What the next level starts from outlives this one.
-            let next = self.has_more_levels(findings).then_some(Step::Place);
+            let next = self.has_more_levels(findings).then_some(Step::Choose);
             workspace.finish_step(step, next, files, to_text(findings))?;
             self.recording.checkpoint(step.name(), 0);
         }

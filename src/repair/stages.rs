@@ -16,6 +16,7 @@ use crate::monitor::{Counter, Monitor};
 use crate::octree::{BrickKey, Domain, DropRecord, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
+use crate::repair::choose::{Trials, most_trials};
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
 use crate::repair::outcome::Outcome;
@@ -50,6 +51,8 @@ pub struct Findings {
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub sign: SignStats,
+    /// The threshold, cells, where it was raised for fewer triangles.
+    raised_cells: Option<f64>,
     pub contour: ContourStats,
     pub written: SinkStats,
     pub proof: Option<Proof>,
@@ -121,6 +124,7 @@ impl Run<'_> {
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
             Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
             Step::Sign => self.sign(workspace, findings, handles, resources)?,
+            Step::Choose => self.choose(workspace, findings, handles, resources)?,
             Step::Place => self.place(workspace, findings, handles, resources)?,
             Step::Separate => self.separate(workspace, findings, handles, resources)?,
             Step::Write => self.write(workspace, findings, handles, resources)?,
@@ -138,6 +142,10 @@ impl Run<'_> {
             Step::Settle | Step::Scan => findings.bins,
             Step::Patch => findings.scan.open_bricks,
             Step::Flood | Step::Sign => findings.scan.bricks,
+            Step::Choose if self.settings.max_triangles.is_some() => {
+                most_trials(self.contour_options(findings).decimate_cells) * findings.sign.bricks
+            }
+            Step::Choose => 0,
             Step::Place => findings.sign.bricks,
             Step::Separate => 0,
             Step::Write => 2 * findings.sign.bricks,
@@ -224,14 +232,32 @@ impl Run<'_> {
         RepairError::EmptyResult { path: self.input.to_path_buf(), reason }
     }
 
-    fn contour_options(&self, findings: &Findings) -> ContourOptions {
+    pub(crate) fn contour_options(&self, findings: &Findings) -> ContourOptions {
         let bounds = &findings.soup().bounds;
-        let decimate_cells = self.level(findings).decimate.in_cells(bounds, findings.domain());
+        let asked_cells = self.level(findings).decimate.in_cells(bounds, findings.domain());
+        let decimate_cells = findings.raised_cells.or(asked_cells);
         ContourOptions {
             method: self.settings.method,
             crease_deg: self.settings.crease_deg,
             decimate_cells: decimate_cells.expect("refused when the grid was laid"),
         }
+    }
+
+    fn choose(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        findings.raised_cells = None;
+        if let Some(limit) = self.settings.max_triangles {
+            let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
+            let (domain, options) = (findings.domain(), self.contour_options(findings));
+            let trials = Trials { signs, domain, options, resources: *resources };
+            findings.raised_cells = Some(trials.choose(limit)?);
+        }
+        Ok(Vec::new())
     }
 
     fn place(

@@ -104,6 +104,7 @@ pub fn estimate(
     limits: &Limits,
     monitor: &dyn Monitor,
 ) -> Result<Estimate, RepairError> {
+    settings.check()?;
     let plan = MemoryPlan::within(limits)?;
     let input_format = crate::io::detect(input).map_err(RepairError::Input)?;
     let total = std::fs::metadata(input).map_or(0, |m| m.len());
@@ -124,7 +125,10 @@ pub fn estimate(
     let reader_bytes = scratch.written_bytes();
     let disk_model = DiskModel { sums: &sums, counts: &counts, plan: &plan, format, reader_bytes };
     let files = disk_model.files();
-    let disk = disk_model.steps(&files);
+    let mut disk = disk_model.steps(&files);
+    if settings.max_triangles.is_none() {
+        disk.choose = 0;
+    }
     let memory_model = MemoryModel {
         sums: &sums,
         counts: &counts,
