@@ -289,9 +289,9 @@ impl Run<'_> {
             separate(signs, cells, domain, &options, &findings.contour, resources)
                 .map_err(RepairError::Contour)?;
         findings.contour = stats;
-        if !self.has_more_levels(findings) {
-            handles.signs = None;
-        }
+        // Another level opens them again, unless they are in memory only.
+        let more = self.has_more_levels(findings);
+        handles.signs.take_if(|signs| !more || signs.state().is_some());
         Ok(hand_on(surface, &mut handles.surface))
     }
 
