@@ -107,6 +107,15 @@ fn what_the_command_line_cannot_mean_ends_with_2() {
         &["--max-memory", "lots"],
         &["--crease", "200"],
         &["--method", "guess"],
+        &["--max-triangles", "0"],
+        &["--max-triangles", "100", "--method", "dmc"],
+        &["--depth", "5", "--max-triangles", "4"],
+        &["--max-triangles", "100", "--lod", "0,1cells"],
+        &["--lod", "0,cells"],
+        &["--lod", "0.5,0.50cells"],
+        &["--lod", "0,1cells", "--decimate", "0"],
+        &["--lod", "0,1cells", "--preview", "out.png"],
+        &["--lod", "0,1cells", "--method", "mc"],
         &["--unheard-of"],
     ] {
         let (code, _, err) = repair(&cube, &output, extra);
@@ -118,6 +127,28 @@ fn what_the_command_line_cannot_mean_ends_with_2() {
     assert_eq!(code, 2, "{err}");
     assert!(err.contains("out.step"), "{err}");
     brickmend().assert().code(2);
+}
+
+#[test]
+fn levels_of_detail_are_files_beside_each_other_and_outcomes_in_a_list() {
+    let folder = folder();
+    let extra = ["--depth", "5", "--lod", "0,0.1,2cells", "--json"];
+    let (code, out, err) = repair(&model(CUBE), &folder.path().join("out.ply"), &extra);
+    assert_eq!(code, 0, "{err}");
+    let names = ["out.0.1cells.ply", "out.0cells.ply", "out.2cells.ply"];
+    assert_eq!(names_in(folder.path()), names);
+    let json: serde_json::Value = serde_json::from_str(&out).expect("JSON");
+    let outcomes = json.as_array().expect("a list");
+    let cells = outcomes.iter().map(|outcome| outcome["settings"]["decimate"]["cells"].as_f64());
+    assert_eq!(cells.collect::<Vec<_>>(), [Some(0.0), Some(0.1), Some(2.0)]);
+    for outcome in outcomes {
+        assert!(outcome["stages"]["verify"]["seconds"].is_number());
+        assert!(Path::new(outcome["output"]["path"].as_str().expect("a path")).exists());
+    }
+    let extra = ["--depth", "5", "--lod", "0,50%"];
+    let (code, _, err) = repair(&model(CUBE), &folder.path().join("all.stl"), &extra);
+    assert_eq!(code, 0, "{err}");
+    assert!(err.contains("all.0cells.stl") && err.contains("all.50pct.stl"), "{err}");
 }
 
 #[test]

@@ -33,6 +33,9 @@ pub struct ResultArguments {
     /// none.
     #[arg(long, value_name = "LENGTH", default_value_t = Reach::DEFAULT_DECIMATE)]
     decimate: Reach,
+    /// Merge more cells than --decimate says where that gives at most so many triangles.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u64).range(1..))]
+    max_triangles: Option<u64>,
     /// How the surface is drawn. The guarantees rest on mdc; the others are for comparison. Where
     /// the proof of another one's file fails, the file is kept and the run ends with 4.
     #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
@@ -102,8 +105,9 @@ impl ResultArguments {
             FillRuleName::Evenodd => FillRule::Evenodd,
         };
         let (crease_deg, strict) = (self.crease, self.strict);
-        let decimate = self.decimate;
-        Settings { depth, fill_rule, crease_deg, method: self.method.into(), decimate, strict }
+        let (decimate, max_triangles) = (self.decimate, self.max_triangles);
+        let method = self.method.into();
+        Settings { depth, fill_rule, crease_deg, method, decimate, max_triangles, strict }
     }
 }
 

@@ -1,4 +1,4 @@
-//! `brickmend repair`: one model, from file to file.
+//! `brickmend repair`: one model, from file to file, or to one file per level of detail.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -6,7 +6,7 @@ use std::process::ExitCode;
 
 use brickmend::io::{ReadOptions, format_of_extension};
 use brickmend::monitor::Void;
-use brickmend::repair::{Limits, Outcome, RepairError, Verdict, repair};
+use brickmend::repair::{Levels, Limits, Outcome, RepairError, Verdict, repair, repair_levels};
 use brickmend::report::{OpenSource, PreviewOptions, write_preview};
 use brickmend::store::Scratch;
 use clap::Args;
@@ -28,6 +28,12 @@ pub struct RepairArguments {
     output: PathBuf,
     #[command(flatten)]
     result: ResultArguments,
+    /// Levels of detail: one file for each of these values of --decimate, such as
+    /// 0,0.1,0.5,2cells, from one run; for -o out.ply they are out.0cells.ply, out.0.1cells.ply and
+    /// so on.
+    #[arg(long, value_name = "LENGTHS", conflicts_with_all = ["decimate", "max_triangles", "preview"],
+          help_heading = "Result")]
+    lod: Option<Levels>,
     #[command(flatten)]
     resources: ResourceArguments,
     /// Most that scratch files and the output may take of the disk, such as 20GB [default: no
@@ -37,7 +43,7 @@ pub struct RepairArguments {
     /// Start anew, whatever an earlier run of the same work left.
     #[arg(long, help_heading = "Resources")]
     fresh: bool,
-    /// Print the outcome as JSON on stdout; see docs/outcome.md.
+    /// Print the outcome as JSON on stdout, with --lod a list of them; see docs/outcome.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
     /// Draw input beside output into a PNG or EXR file.
@@ -70,12 +76,19 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         ..arguments.resources.limits()
     };
     let (input, output) = (&arguments.input, &arguments.output);
-    let result = repair(input, output, format, &settings, &limits, &progress);
+    let result = match &arguments.lod {
+        Some(Levels(levels)) => {
+            repair_levels(input, output, format, &settings, levels, &limits, &progress)
+        }
+        None => repair(input, output, format, &settings, &limits, &progress).map(|one| vec![one]),
+    };
     progress.clear();
     match result {
-        Ok(mut outcome) => {
-            outcome.stages = progress.stages();
-            finish(arguments, &mut outcome, chatter)
+        Ok(mut outcomes) => {
+            for outcome in &mut outcomes {
+                outcome.stages = progress.stages();
+            }
+            finish(arguments, &mut outcomes, chatter)
         }
         Err(error) => fail(&error, &stop, chatter),
     }
@@ -89,9 +102,9 @@ fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
     }
 }
 
-/// Tells the outcome, draws the preview.
-fn finish(arguments: &RepairArguments, outcome: &mut Outcome, chatter: &Chatter) -> ExitCode {
-    let sound = outcome.verdict != Verdict::Fail;
+/// Tells the outcomes, draws the preview.
+fn finish(arguments: &RepairArguments, outcomes: &mut [Outcome], chatter: &Chatter) -> ExitCode {
+    let sound = outcomes.iter().all(|outcome| outcome.verdict != Verdict::Fail);
     let mut exit = if sound { Exit::Success } else { Exit::NoResult };
     if let Some(path) = &arguments.preview
         && let Err(error) = draw(arguments, path)
@@ -99,13 +112,19 @@ fn finish(arguments: &RepairArguments, outcome: &mut Outcome, chatter: &Chatter)
         chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));
         exit = Exit::Unusable;
     }
-    outcome.memory.peak_bytes = peak_resident_bytes();
+    for outcome in outcomes.iter_mut() {
+        outcome.memory.peak_bytes = peak_resident_bytes();
+    }
     if arguments.json {
-        let text = serde_json::to_string_pretty(outcome).expect("plain records serialise");
+        let text = match &*outcomes {
+            [outcome] if arguments.lod.is_none() => serde_json::to_string_pretty(outcome),
+            outcomes => serde_json::to_string_pretty(outcomes),
+        };
+        let text = text.expect("plain records serialise");
         // A reader that went away is no failure of the repair.
         let _ = writeln!(std::io::stdout(), "{text}");
     } else {
-        chatter.say(&summary(outcome));
+        outcomes.iter().for_each(|outcome| chatter.say(&summary(outcome)));
     }
     exit.into()
 }

@@ -19,6 +19,7 @@
 pub mod mc;
 pub mod mdc;
 
+mod count;
 mod maker;
 
 #[cfg(test)]
@@ -30,6 +31,7 @@ use serde::{Deserialize, Serialize};
 use crate::octree::{BrickError, Domain};
 use crate::store::{BrickFile, BrickWriter, Resources, StoreError};
 
+pub use count::count_triangles;
 pub use write::{WriteError, WriteProgress, write_surface};
 
 /// Name of the brick file that [`place_vertices`] leaves.
@@ -92,9 +94,15 @@ pub struct ContourOptions {
 }
 
 impl ContourOptions {
+    /// The threshold at which cells are merged, in cells; 0 for none.
+    #[must_use]
+    pub fn merged_cells(&self) -> f64 {
+        if self.method == Method::Mdc { self.decimate_cells } else { 0.0 }
+    }
+
     /// Whether cells are clustered.
     pub(crate) fn has_clusters(&self) -> bool {
-        self.method == Method::Mdc && self.decimate_cells > 0.0
+        self.merged_cells() > 0.0
     }
 }
 

@@ -86,7 +86,7 @@ where
 }
 
 /// The number of the first vertex of each brick, and their total.
-fn number_vertices(cells: &Layers) -> Result<Vec<u32>, StoreError> {
+pub fn number_vertices(cells: &Layers) -> Result<Vec<u32>, StoreError> {
     let limit = u64::from(FAN_POINT) - 1;
     let mut bases = Vec::with_capacity(cells.bricks() + 1);
     let mut total = 0_u64;

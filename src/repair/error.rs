@@ -6,6 +6,7 @@ use crate::contour::{ContourError, WriteError};
 use crate::ingest::{IngestError, SoupStats};
 use crate::io::IoError;
 use crate::patch::PatchError;
+use crate::repair::length::Reach;
 use crate::sign::SignError;
 use crate::store::StoreError;
 use crate::verify::VerifyError;
@@ -71,6 +72,29 @@ pub enum RepairError {
         path: PathBuf,
         /// The work folder.
         folder: PathBuf,
+    },
+    /// Two levels of detail would be the same file.
+    #[error("The level {level} is listed twice")]
+    SameLevel {
+        /// The level.
+        level: Reach,
+    },
+    /// A method that does not merge cells was asked to.
+    #[error("{option} needs --method mdc: no other merges cells")]
+    NothingToMerge {
+        /// What asked for it.
+        option: &'static str,
+    },
+    /// No threshold gives as few triangles as were asked for.
+    #[error(
+        "At most {limit} triangles were asked for, and the surface has {fewest} at the least, \
+         however many cells are merged; a smaller --depth gives fewer"
+    )]
+    TooManyTriangles {
+        /// What was asked for.
+        limit: u64,
+        /// The fewest that were found.
+        fewest: u64,
     },
     /// A length with a unit for a file without one.
     #[error("{path} states no unit, so a length in metres means nothing; give model units or %")]
@@ -181,6 +205,9 @@ impl RepairError {
             | Self::DiskBelowEstimate { .. }
             | Self::OutputIsInput { .. }
             | Self::InputInWorkFolder { .. }
+            | Self::SameLevel { .. }
+            | Self::NothingToMerge { .. }
+            | Self::TooManyTriangles { .. }
             | Self::NoUnit { .. }
             | Self::OutputTooCoarse { .. } => Blame::Usage,
             Self::EmptyResult { .. } => Blame::Model,

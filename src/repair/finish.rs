@@ -1,4 +1,4 @@
-//! Draws the conclusion: what was found, invented and dropped, and whether a person should look.
+//! Draws the conclusion of a level: what was found, invented and dropped, and whether a person should look.
 
 use std::collections::BTreeMap;
 
@@ -8,7 +8,7 @@ use crate::repair::outcome::{
     SCHEMA_VERSION, SoupReport, Verdict,
 };
 use crate::repair::run::Run;
-use crate::repair::settings::Depth;
+use crate::repair::settings::{Depth, Settings};
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
 use crate::verify::Proof;
@@ -18,13 +18,14 @@ const LOST_AREA_SHARE: f64 = 0.2;
 /// So is filling more than this share of the volume.
 const FILLED_VOLUME_SHARE: f64 = 0.05;
 
-/// Makes the outcome of a finished run.
+/// Makes the outcome of the level under way, which is finished.
 pub fn conclude(
     run: &Run,
     workspace: &Workspace,
-    findings: Findings,
-    rebuilt: Vec<String>,
+    findings: &Findings,
+    rebuilt: &[String],
 ) -> Outcome {
+    let (level, options) = (run.level(findings), run.contour_options(findings));
     let domain = *findings.domain();
     let soup = *findings.soup();
     let proof = findings.proof.clone().unwrap_or_default();
@@ -36,10 +37,10 @@ pub fn conclude(
         sealed_by_resolution_volume: findings.sign.sealed_by_resolution_cells as f64 * cell_volume,
         largest_openings: findings.patch.largest.clone(),
     };
-    let dropped = dropped(&findings);
+    let dropped = dropped(findings);
     let area_ratio = proof.area / findings.measure.area;
     let broken = broken_promises(&proof);
-    let mut reasons = reasons(run, &findings, &invented, &dropped, area_ratio, &proof);
+    let mut reasons = reasons(run, findings, &invented, &dropped, area_ratio, &proof);
     let verdict = judge(&broken, &mut reasons);
     run.recording.gauge(Gauge::GrantedBytes, run.accountant.peak_bytes());
     Outcome {
@@ -55,7 +56,7 @@ pub fn conclude(
             bounds: soup.bounds,
             measure: findings.measure,
         },
-        settings: *run.settings,
+        settings: Settings { decimate: level.decimate, ..run.settings },
         grid: domain,
         cell_size: domain.cell_size(),
         found: Found {
@@ -67,15 +68,16 @@ pub fn conclude(
         invented,
         dropped,
         output: OutputReport {
-            path: run.output.to_path_buf(),
+            path: level.output.clone(),
             bytes: findings.written.file.bytes,
             proof,
             area_ratio,
+            decimate_cells: options.merged_cells(),
             contour: findings.contour,
             caveat: run.settings.method.caveat().map(str::to_owned),
         },
         scan: findings.scan,
-        patch: findings.patch,
+        patch: findings.patch.clone(),
         sign: findings.sign,
         stages: BTreeMap::new(),
         counters: Counter::ALL.map(|c| (c, run.recording.total(c))).into_iter().collect(),
@@ -90,7 +92,7 @@ pub fn conclude(
             limit_bytes: run.limits.max_disk_bytes,
             peak_bytes: workspace.scratch().peak_bytes(),
         },
-        resume: ResumeReport { resumptions: workspace.resumptions(), rebuilt },
+        resume: ResumeReport { resumptions: workspace.resumptions(), rebuilt: rebuilt.to_vec() },
     }
 }
 

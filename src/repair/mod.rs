@@ -1,16 +1,19 @@
 //! The one place that knows the order of the stages.
 //!
 //! In:         a model file, [`Settings`], [`Limits`].
-//! Out:        a proven file in its place, and an [`Outcome`] that tells everything.
+//! Out:        a proven file in its place, and an [`Outcome`] that tells everything; one of each
+//!             per level of detail.
 //! Invariant:  the output appears whole or not at all; what was there before stays until then.
 //! Memory:     [`Limits::max_memory_bytes`], shared out by one accountant.
 //! Fails:      [`RepairError`], one message with place, and the work folder kept or removed.
 
+mod choose;
 mod depth;
 mod error;
 mod estimate;
 mod finish;
 mod length;
+mod levels;
 mod lock;
 mod outcome;
 mod plan;
@@ -24,10 +27,11 @@ mod workspace;
 pub use error::{Blame, RepairError};
 pub use estimate::{Bounds, Counts, DiskSteps, ESTIMATE_VERSION, Estimate, estimate};
 pub use length::{Length, LengthError, Reach};
+pub use levels::Levels;
 pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
 pub use plan::{MemoryPlan, floor_bytes};
-pub use run::repair;
+pub use run::{repair, repair_levels};
 pub use settings::{Depth, Limits, Settings};

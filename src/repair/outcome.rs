@@ -102,6 +102,8 @@ pub struct OutputReport {
     pub proof: Proof,
     /// Output area over input area.
     pub area_ratio: f64,
+    /// The threshold at which cells were merged, in cells; 0 by methods that merge none.
+    pub decimate_cells: f64,
     /// Counts of contouring.
     pub contour: ContourStats,
     /// What the method cannot promise, if it is not the one that the guarantees rest on.

@@ -1,20 +1,23 @@
-//! A run from start to end: the lock, the key, the steps, the ways back, and the output in place.
+//! A run from start to end: the lock, the key, the steps, the ways back, and the outputs in place.
 
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use rayon::ThreadPool;
 
+use crate::contour::Method;
 use crate::io::{Format, IoError, check_output};
 use crate::monitor::{Counter, Monitor, Recording};
 use crate::repair::RepairError;
 use crate::repair::estimate::estimate;
 use crate::repair::finish::conclude;
+use crate::repair::length::Reach;
+use crate::repair::levels::Level;
 use crate::repair::outcome::Outcome;
 use crate::repair::plan::MemoryPlan;
 use crate::repair::settings::{Limits, Settings};
-use crate::repair::stages::{Findings, Handles};
+use crate::repair::stages::{Findings, FinishedLevel, Handles};
 use crate::repair::step::Step;
 use crate::repair::workspace::Workspace;
 use crate::store::{Accountant, Resources, StoreError};
@@ -38,20 +41,74 @@ pub fn repair(
     limits: &Limits,
     monitor: &dyn Monitor,
 ) -> Result<Outcome, RepairError> {
+    let level = Level { decimate: settings.decimate, output: output.to_path_buf() };
+    let work = Work { input, output, format, settings: *settings, levels: vec![level] };
+    let outcomes = run(work, "", limits, monitor)?;
+    Ok(outcomes.into_iter().next_back().expect("one level has one outcome"))
+}
+
+/// Repairs `input` into one file for each of `levels`, which take the place of
+/// [`Settings::decimate`]; all else is done once. The names are that of `output` with the level
+/// before the extension: `out.0.1cells.ply`. Each file is what [`repair`] makes of that threshold.
+///
+/// The files come into place one by one; a run that is stopped keeps those that are, and goes on
+/// with the next.
+///
+/// # Errors
+/// [`RepairError`].
+pub fn repair_levels(
+    input: &Path,
+    output: &Path,
+    format: Format,
+    settings: &Settings,
+    levels: &[Reach],
+    limits: &Limits,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Outcome>, RepairError> {
+    let Some(&decimate) = levels.first() else { return Ok(Vec::new()) };
+    if settings.method != Method::Mdc {
+        return Err(RepairError::NothingToMerge { option: "--lod" });
+    }
+    let named = serde_json::to_string(levels).expect("plain records serialise");
+    let levels = Level::beside(output, levels)?;
+    let settings = Settings { decimate, ..*settings };
+    run(Work { input, output, format, settings, levels }, &named, limits, monitor)
+}
+
+/// What is to be done.
+struct Work<'w> {
+    input: &'w Path,
+    /// What the work folder is named after.
+    output: &'w Path,
+    format: Format,
+    settings: Settings,
+    levels: Vec<Level>,
+}
+
+/// Does all of `work`; `named` are the levels as far as the settings do not tell them.
+fn run(
+    work: Work,
+    named: &str,
+    limits: &Limits,
+    monitor: &dyn Monitor,
+) -> Result<Vec<Outcome>, RepairError> {
+    let Work { input, output, format, settings, levels } = work;
+    settings.check()?;
     let plan = MemoryPlan::within(limits)?;
     crate::io::detect(input).map_err(RepairError::Input)?;
-    keep_input(input, output)?;
+    levels.iter().try_for_each(|level| keep_input(input, &level.output))?;
     let pool = start_threads(plan.threads)?;
     let recording = Recording::new(monitor);
     let seen = InputIdentity::of(input)?;
-    let key = run_key(input, format, settings, &recording)?;
-    let workspace = Workspace::open(input, output, limits, key)?;
+    let key = run_key(input, format, &settings, named, &recording)?;
+    let outputs: Vec<PathBuf> = levels.iter().map(|level| level.output.clone()).collect();
+    let workspace = Workspace::open(input, output, outputs, limits, key)?;
     let accountant = Accountant::new(limits.max_memory_bytes);
-    let run = Run { input, output, format, settings, limits, plan, recording, accountant, seen };
+    let run = Run { input, format, settings, levels, limits, plan, recording, accountant, seen };
     match run.to_the_end(&workspace, &pool) {
-        Ok(outcome) => {
+        Ok(outcomes) => {
             workspace.remove();
-            Ok(outcome)
+            Ok(outcomes)
         }
         Err(error) => {
             if !error.keeps_work() {
@@ -81,11 +138,12 @@ fn start_threads(threads: usize) -> Result<ThreadPool, RepairError> {
         .map_err(|source| RepairError::Threads { threads, source })
 }
 
-/// blake3 of input bytes, settings, format and version: another key is another run.
+/// blake3 of input bytes, settings, levels, format and version: another key is another run.
 fn run_key(
     input: &Path,
     format: Format,
     settings: &Settings,
+    levels: &str,
     monitor: &dyn Monitor,
 ) -> Result<[u8; 32], RepairError> {
     let mut hasher = blake3::Hasher::new();
@@ -107,6 +165,7 @@ fn run_key(
     }
     let settings = serde_json::to_string(settings).expect("plain records serialise");
     hasher.update(settings.as_bytes());
+    hasher.update(levels.as_bytes());
     hasher.update(format!("{format:?}").as_bytes());
     hasher.update(env!("CARGO_PKG_VERSION").as_bytes());
     hasher.update(&crate::store::FORMAT_VERSION.to_le_bytes());
@@ -151,9 +210,10 @@ impl InputIdentity {
 /// A run under way.
 pub struct Run<'r> {
     pub input: &'r Path,
-    pub output: &'r Path,
     pub format: Format,
-    pub settings: &'r Settings,
+    pub settings: Settings,
+    /// The thresholds, one after the other, and their files.
+    levels: Vec<Level>,
     pub limits: &'r Limits,
     pub plan: MemoryPlan,
     pub recording: Recording<'r>,
@@ -162,21 +222,19 @@ pub struct Run<'r> {
 }
 
 impl Run<'_> {
-    /// Does all steps that are left and puts the output in its place. A file of the work folder
+    /// Does all steps that are left and puts the outputs in their places. A file of the work folder
     /// that turns out damaged is made again from the step before.
-    fn to_the_end(&self, workspace: &Workspace, pool: &ThreadPool) -> Result<Outcome, RepairError> {
+    fn to_the_end(
+        &self,
+        workspace: &Workspace,
+        pool: &ThreadPool,
+    ) -> Result<Vec<Outcome>, RepairError> {
         self.check_disk_limit(workspace)?;
         let _leases = self.plan.lease(&self.accountant)?;
         let mut rebuilt = Vec::new();
         loop {
-            let error = match self.steps(workspace, pool) {
-                Ok(findings) => {
-                    let scratch = workspace.scratch();
-                    self.recording.count(Counter::ScratchBytesRead, scratch.read_bytes());
-                    self.recording.count(Counter::ScratchBytesWritten, scratch.written_bytes());
-                    self.recording.count(Counter::SpilledRuns, scratch.spilled_runs());
-                    return Ok(conclude(self, workspace, findings, rebuilt));
-                }
+            let error = match self.all_levels(workspace, pool, &rebuilt) {
+                Ok(outcomes) => return Ok(outcomes),
                 Err(error) => error,
             };
             let Some(path) = error.damaged_file().map(Path::to_path_buf) else { return Err(error) };
@@ -200,24 +258,107 @@ impl Run<'_> {
             Limits { work_dir: Some(workspace.folder().to_path_buf()), ..self.limits.clone() };
         // The estimate reads the input as well; what it reads is not what the run reads.
         let quiet = OnlyCancel { monitor: &self.recording };
-        let needed_bytes =
-            estimate(self.input, self.format, self.settings, &limits, &quiet)?.disk_bytes;
+        let needed_bytes = estimate(self.input, self.format, &self.settings, &limits, &quiet)?
+            .disk_bytes_with_levels(self.levels.len() as u64);
         if needed_bytes > limit_bytes {
             return Err(RepairError::DiskBelowEstimate { limit_bytes, needed_bytes });
         }
         Ok(())
     }
 
-    /// Does the steps that are left; what all of them found out.
-    fn steps(&self, workspace: &Workspace, pool: &ThreadPool) -> Result<Findings, RepairError> {
+    /// Does the levels that are left; what came of all of them.
+    fn all_levels(
+        &self,
+        workspace: &Workspace,
+        pool: &ThreadPool,
+        rebuilt: &[String],
+    ) -> Result<Vec<Outcome>, RepairError> {
         let mut findings = self.earlier_findings(workspace)?;
-        if workspace.is_in_place() {
-            return Ok(findings);
+        self.forget_lost_levels(workspace, &mut findings)?;
+        let mut handles = Handles::default();
+        loop {
+            if !workspace.is_in_place() {
+                self.steps(workspace, pool, &mut findings, &mut handles)?;
+                workspace.put_in_place()?;
+                let output = self.level(&findings).output.display();
+                self.recording.note(&format!("{output} is in place"));
+            }
+            self.count_scratch(workspace);
+            let outcome = conclude(self, workspace, &findings, rebuilt);
+            if !self.has_more_levels(&findings) {
+                return Ok(self.outcomes(findings, outcome));
+            }
+            findings.finished.push(FinishedLevel { outcome, file: findings.written.file });
+            workspace.go_back_to(Step::Choose, to_text(&findings))?;
         }
+    }
+
+    /// The outcomes of the levels before, and of the last one.
+    fn outcomes(&self, findings: Findings, last: Outcome) -> Vec<Outcome> {
+        let finished = findings.finished.into_iter().zip(&self.levels).map(|(done, level)| {
+            let mut outcome = done.outcome;
+            // Text cannot hold every path.
+            outcome.input.path = self.input.to_path_buf();
+            outcome.output.path = level.output.clone();
+            outcome
+        });
+        finished.chain([last]).collect()
+    }
+
+    /// All levels.
+    pub(crate) fn levels(&self) -> &[Level] {
+        &self.levels
+    }
+
+    /// The level under way.
+    pub(crate) fn level(&self, findings: &Findings) -> &Level {
+        &self.levels[findings.finished.len()]
+    }
+
+    /// Whether others follow the level under way.
+    pub(crate) fn has_more_levels(&self, findings: &Findings) -> bool {
+        findings.finished.len() + 1 < self.levels.len()
+    }
+
+    /// Goes back to the first level of an earlier run whose file is not what it wrote.
+    fn forget_lost_levels(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+    ) -> Result<(), RepairError> {
+        let is_lost = |(done, level): (&FinishedLevel, &Level)| {
+            check_output(&level.output, &done.file, workspace.scratch()).is_err()
+        };
+        let Some(lost) = findings.finished.iter().zip(&self.levels).position(is_lost) else {
+            return Ok(());
+        };
+        findings.finished.truncate(lost);
+        Ok(workspace.go_back_to(Step::Choose, to_text(findings))?)
+    }
+
+    /// Brings the counters up to what moved so far.
+    fn count_scratch(&self, workspace: &Workspace) {
+        let scratch = workspace.scratch();
+        for (counter, total) in [
+            (Counter::ScratchBytesRead, scratch.read_bytes()),
+            (Counter::ScratchBytesWritten, scratch.written_bytes()),
+            (Counter::SpilledRuns, scratch.spilled_runs()),
+        ] {
+            self.recording.count(counter, total - self.recording.total(counter));
+        }
+    }
+
+    /// Does the steps that are left of the level under way.
+    fn steps(
+        &self,
+        workspace: &Workspace,
+        pool: &ThreadPool,
+        findings: &mut Findings,
+        handles: &mut Handles,
+    ) -> Result<(), RepairError> {
         if let (None, Some(written)) = (workspace.next_step(), workspace.written()) {
             check_output(workspace.part(), &written, workspace.scratch())?;
         }
-        let mut handles = Handles::default();
         while let Some(step) = workspace.next_step() {
             if self.recording.cancelled() {
                 return Err(StoreError::Cancelled.into());
@@ -232,22 +373,24 @@ impl Run<'_> {
                 checkpoints: &checkpoints,
                 monitor: &self.recording,
             };
-            let files = self.step(step, workspace, &mut findings, &mut handles, &resources)?;
-            let text = serde_json::to_string(&findings).expect("plain records serialise");
-            workspace.finish_step(step, files, text)?;
+            let files = self.step(step, workspace, findings, handles, &resources)?;
+            // What the next level starts from outlives this one.
+            let next = self.has_more_levels(findings).then_some(Step::Choose);
+            workspace.finish_step(step, next, files, to_text(findings))?;
             self.recording.checkpoint(step.name(), 0);
         }
-        workspace.put_in_place()?;
-        Ok(findings)
+        Ok(())
     }
 
     /// What the steps of an earlier run found out.
     fn earlier_findings(&self, workspace: &Workspace) -> Result<Findings, RepairError> {
+        let found: Result<Findings, _> = serde_json::from_str(&workspace.findings());
         if workspace.next_step() == Some(Step::Read) {
-            return Ok(Findings::default());
+            let finished = found.map(|found| found.finished).unwrap_or_default();
+            return Ok(Findings::after(finished));
         }
         // Numbers that JSON cannot hold (infinite areas) are not worth a special case.
-        match serde_json::from_str(&workspace.findings()) {
+        match found {
             Ok(findings) => Ok(findings),
             Err(_) => {
                 workspace.start_again()?;
@@ -263,4 +406,9 @@ impl Run<'_> {
         }
         Err(RepairError::InputChanged { path: self.input.to_path_buf() })
     }
+}
+
+/// Findings as the manifest holds them.
+fn to_text(findings: &Findings) -> String {
+    serde_json::to_string(findings).expect("plain records serialise")
 }

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::contour::Method;
+use crate::repair::RepairError;
 use crate::repair::length::{Length, Reach};
 use crate::sign::FillRule;
 use crate::store::Backing;
@@ -48,6 +49,8 @@ pub struct Settings {
     /// Cells are merged where no plane lies farther than this from the vertex that stands for
     /// them; 0 for none.
     pub decimate: Reach,
+    /// The threshold above is raised until the surface has at most so many triangles.
+    pub max_triangles: Option<u64>,
     /// Refuse broken faces in place of dropping them.
     pub strict: bool,
 }
@@ -60,8 +63,22 @@ impl Default for Settings {
             crease_deg: 12.0,
             method: Method::Mdc,
             decimate: Reach::DEFAULT_DECIMATE,
+            max_triangles: None,
             strict: false,
         }
+    }
+}
+
+impl Settings {
+    /// Refuses what cannot be, whatever the model.
+    ///
+    /// # Errors
+    /// [`RepairError::NothingToMerge`].
+    pub(crate) fn check(&self) -> Result<(), RepairError> {
+        if self.max_triangles.is_some() && self.method != Method::Mdc {
+            return Err(RepairError::NothingToMerge { option: "--max-triangles" });
+        }
+        Ok(())
     }
 }
 

@@ -11,13 +11,15 @@ use crate::ingest::{
     read_soup, settle,
 };
 use crate::io::{ReadOptions, check_output};
-use crate::mesh::SinkStats;
+use crate::mesh::{SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::{BrickKey, Domain, DropRecord, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
+use crate::repair::choose::{Trials, most_trials};
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
+use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
@@ -25,6 +27,15 @@ use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, SpoolPeek, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
+
+/// A level of detail whose file is in its place.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+pub struct FinishedLevel {
+    /// What came of it.
+    pub outcome: Outcome,
+    /// The file.
+    pub file: SinkFile,
+}
 
 /// What the finished steps found out; a checkpoint remembers it besides the files.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
@@ -40,12 +51,21 @@ pub struct Findings {
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub sign: SignStats,
+    /// The threshold, cells, where it was raised for fewer triangles.
+    raised_cells: Option<f64>,
     pub contour: ContourStats,
     pub written: SinkStats,
     pub proof: Option<Proof>,
+    /// The levels before the one under way.
+    pub finished: Vec<FinishedLevel>,
 }
 
 impl Findings {
+    /// Nothing but the levels that are in place.
+    pub fn after(finished: Vec<FinishedLevel>) -> Self {
+        Self { finished, ..Self::default() }
+    }
+
     /// What was found out about the input.
     pub fn soup(&self) -> &SoupFacts {
         self.soup.as_ref().expect("the input is read first")
@@ -104,6 +124,7 @@ impl Run<'_> {
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
             Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
             Step::Sign => self.sign(workspace, findings, handles, resources)?,
+            Step::Choose => self.choose(workspace, findings, handles, resources)?,
             Step::Place => self.place(workspace, findings, handles, resources)?,
             Step::Separate => self.separate(workspace, findings, handles, resources)?,
             Step::Write => self.write(workspace, findings, handles, resources)?,
@@ -121,6 +142,10 @@ impl Run<'_> {
             Step::Settle | Step::Scan => findings.bins,
             Step::Patch => findings.scan.open_bricks,
             Step::Flood | Step::Sign => findings.scan.bricks,
+            Step::Choose if self.settings.max_triangles.is_some() => {
+                most_trials(self.contour_options(findings).decimate_cells) * findings.sign.bricks
+            }
+            Step::Choose => 0,
             Step::Place => findings.sign.bricks,
             Step::Separate => 0,
             Step::Write => 2 * findings.sign.bricks,
@@ -146,7 +171,7 @@ impl Run<'_> {
         }
         let (depth, bounds) = (self.settings.depth, &soup.facts.bounds);
         let domain = choose_domain(self.input, bounds, depth, self.format)?;
-        if self.settings.decimate.in_cells(bounds, &domain).is_none() {
+        if self.levels().iter().any(|level| level.decimate.in_cells(bounds, &domain).is_none()) {
             return Err(RepairError::NoUnit { path: self.input.to_path_buf() });
         }
         findings.domain = Some(domain);
@@ -207,14 +232,32 @@ impl Run<'_> {
         RepairError::EmptyResult { path: self.input.to_path_buf(), reason }
     }
 
-    fn contour_options(&self, findings: &Findings) -> ContourOptions {
+    pub(crate) fn contour_options(&self, findings: &Findings) -> ContourOptions {
         let bounds = &findings.soup().bounds;
-        let decimate_cells = self.settings.decimate.in_cells(bounds, findings.domain());
+        let asked_cells = self.level(findings).decimate.in_cells(bounds, findings.domain());
+        let decimate_cells = findings.raised_cells.or(asked_cells);
         ContourOptions {
             method: self.settings.method,
             crease_deg: self.settings.crease_deg,
             decimate_cells: decimate_cells.expect("refused when the grid was laid"),
         }
+    }
+
+    fn choose(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        findings.raised_cells = None;
+        if let Some(limit) = self.settings.max_triangles {
+            let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
+            let (domain, options) = (findings.domain(), self.contour_options(findings));
+            let trials = Trials { signs, domain, options, resources: *resources };
+            findings.raised_cells = Some(trials.choose(limit)?);
+        }
+        Ok(Vec::new())
     }
 
     fn place(
@@ -246,7 +289,9 @@ impl Run<'_> {
             separate(signs, cells, domain, &options, &findings.contour, resources)
                 .map_err(RepairError::Contour)?;
         findings.contour = stats;
-        handles.signs = None;
+        // Another level opens them again, unless they are in memory only.
+        let more = self.has_more_levels(findings);
+        handles.signs.take_if(|signs| !more || signs.state().is_some());
         Ok(hand_on(surface, &mut handles.surface))
     }
 

@@ -1,5 +1,8 @@
 //! Where a run stands, by its manifest: which steps are finished, and which files are of use.
 
+use serde::Deserialize;
+use serde::de::IgnoredAny;
+
 use crate::contour::LOOKS;
 use crate::io::FACES;
 use crate::mesh::SinkFile;
@@ -23,6 +26,15 @@ pub fn next_step(manifest: &Manifest) -> Option<Step> {
 pub fn written(manifest: &Manifest) -> Option<SinkFile> {
     let file = manifest.files.iter().find(|file| file.name == OUTPUT_PART)?;
     Some(SinkFile { bytes: file.len_bytes, digest: file.root })
+}
+
+/// How many levels of detail were finished before the one under way.
+pub fn finished_levels(manifest: &Manifest) -> usize {
+    #[derive(Deserialize)]
+    struct Finished {
+        finished: Vec<IgnoredAny>,
+    }
+    serde_json::from_str(&manifest.findings).map_or(0, |found: Finished| found.finished.len())
 }
 
 /// Forgets `step` and all that came after it.

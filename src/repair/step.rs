@@ -30,6 +30,8 @@ pub enum Step {
     Flood,
     /// Hits and flips become signs.
     Sign,
+    /// The threshold is found that gives few enough triangles, where a number is set.
+    Choose,
     /// Signs become vertices.
     Place,
     /// Surfaces in one cell are kept apart.
@@ -42,7 +44,7 @@ pub enum Step {
 
 impl Step {
     /// All steps.
-    pub const ALL: [Self; 11] = [
+    pub const ALL: [Self; 12] = [
         Self::Read,
         Self::Bin,
         Self::Settle,
@@ -50,6 +52,7 @@ impl Step {
         Self::Patch,
         Self::Flood,
         Self::Sign,
+        Self::Choose,
         Self::Place,
         Self::Separate,
         Self::Write,
@@ -66,6 +69,7 @@ impl Step {
             Self::Patch => "patch",
             Self::Flood => "flood",
             Self::Sign => "sign",
+            Self::Choose => "choose",
             Self::Place => "place",
             Self::Separate => "separate",
             Self::Write => "write",
@@ -80,7 +84,7 @@ impl Step {
             Self::Scan => Stage::Scan,
             Self::Patch => Stage::Patch,
             Self::Flood | Self::Sign => Stage::Sign,
-            Self::Place | Self::Separate | Self::Write => Stage::Contour,
+            Self::Choose | Self::Place | Self::Separate | Self::Write => Stage::Contour,
             Self::Prove => Stage::Verify,
         }
     }
@@ -98,7 +102,7 @@ impl Step {
             Self::Place => &[CELLS],
             Self::Separate => &[SURFACE],
             Self::Write => &[OUTPUT_PART],
-            Self::Prove => &[],
+            Self::Choose | Self::Prove => &[],
         }
     }
 
@@ -112,7 +116,7 @@ impl Step {
             Self::Patch => &[HITS],
             Self::Flood => &[HITS, FLIPS],
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, SHEETS],
-            Self::Place => &[SIGNS],
+            Self::Choose | Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],
             Self::Write => &[CELLS, SURFACE],
             Self::Prove => &[OUTPUT_PART],
@@ -128,8 +132,10 @@ impl Step {
     /// do this one again.
     pub fn still_needs(self, file: &str) -> bool {
         let last_reader = Self::ALL.into_iter().rfind(|step| step.reads().contains(&file));
+        // Choosing leaves no file, so what the signs came from waits for the step after it.
+        let finished = if self == Self::Choose { Self::Sign } else { self };
         // Nobody reads attributes yet.
-        last_reader.is_none_or(|reader| reader >= self)
+        last_reader.is_none_or(|reader| reader >= finished)
     }
 
     /// The step after which all inputs of this one are there, given the files that are.
@@ -166,6 +172,7 @@ mod tests {
         assert!(Step::Scan.still_needs(BINS));
         assert!(!Step::Patch.still_needs(BINS));
         assert!(Step::Sign.still_needs(HITS));
+        assert!(Step::Choose.still_needs(HITS));
         assert!(!Step::Place.still_needs(HITS));
         assert!(Step::Prove.still_needs(OUTPUT_PART));
     }

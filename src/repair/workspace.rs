@@ -20,7 +20,7 @@ use crate::repair::RepairError;
 use crate::repair::lock::{LOCK, lock_folder};
 use crate::repair::settings::Limits;
 use crate::repair::standing::{
-    MANIFEST, PASSING, all_names, go_back, is_listed, next_step, written,
+    MANIFEST, PASSING, all_names, finished_levels, go_back, is_listed, next_step, written,
 };
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::store::{
@@ -34,7 +34,8 @@ const ENDING: &str = "brickmend";
 /// A locked work folder.
 pub struct Workspace {
     folder: PathBuf,
-    output: PathBuf,
+    /// The files of the levels of detail.
+    outputs: Vec<PathBuf>,
     part: PathBuf,
     scratch: Scratch,
     interval_bytes: u64,
@@ -46,7 +47,7 @@ pub struct Workspace {
 }
 
 impl Workspace {
-    /// Creates and locks the work folder for `output`. What an earlier run of the same `key` has
+    /// Creates and locks the work folder named after `output`, for `outputs` in the same folder. What an earlier run of the same `key` has
     /// finished is kept; all else is discarded.
     ///
     /// # Errors
@@ -54,6 +55,7 @@ impl Workspace {
     pub fn open(
         input: &Path,
         output: &Path,
+        outputs: Vec<PathBuf>,
         limits: &Limits,
         key: [u8; 32],
     ) -> Result<Self, RepairError> {
@@ -80,7 +82,7 @@ impl Workspace {
         let scratch = Scratch::limited(&folder, limits.max_disk_bytes.unwrap_or(u64::MAX));
         let workspace = Self {
             folder,
-            output: output.to_path_buf(),
+            outputs,
             part,
             scratch,
             interval_bytes: limits.checkpoint_bytes,
@@ -112,6 +114,8 @@ impl Workspace {
             self.scratch.adopt(&self.path_of(name));
             self.scratch.adopt(&self.folder.join(directory_name(name)));
         }
+        let in_place = finished_levels(&manifest) + usize::from(self.is_in_place_by(&manifest));
+        self.outputs.iter().take(in_place).for_each(|output| self.scratch.adopt(output));
         Ok(())
     }
 
@@ -194,23 +198,26 @@ impl Workspace {
         self.manifest().files.clone()
     }
 
-    /// Commits a step: what is on disk is what the next one starts from. Files that are no longer
-    /// of use are removed.
+    /// Commits a step: what is on disk is what the following one starts from. Files that are no
+    /// longer of use are removed, unless a step that comes `again` for another level reads them.
     ///
     /// # Errors
     /// The folder cannot be written.
     pub fn finish_step(
         &self,
         step: Step,
+        again: Option<Step>,
         files: Vec<FileState>,
         findings: String,
     ) -> Result<(), StoreError> {
         let mut manifest = self.manifest();
         manifest.steps.push(step.name().to_owned());
         manifest.files.extend(files);
-        let (kept, spent) = std::mem::take(&mut manifest.files)
-            .into_iter()
-            .partition::<Vec<_>, _>(|file| step.still_needs(&file.name));
+        let (kept, spent) =
+            std::mem::take(&mut manifest.files).into_iter().partition::<Vec<_>, _>(|file| {
+                let name = file.name.as_str();
+                step.still_needs(name) || again.is_some_and(|step| step.reads().contains(&name))
+            });
         manifest.files = kept;
         manifest.progress = None;
         manifest.findings = findings;
@@ -251,6 +258,22 @@ impl Workspace {
         Ok(Some(step))
     }
 
+    /// Goes back to `step` for another level of detail, or to one before it whose inputs are there.
+    ///
+    /// # Errors
+    /// The folder cannot be written.
+    pub fn go_back_to(&self, step: Step, findings: String) -> Result<(), StoreError> {
+        let mut manifest = self.manifest();
+        manifest.findings = findings;
+        if !self.is_kept {
+            go_back(&mut manifest, step);
+            return Ok(());
+        }
+        let step = step.with_inputs(|name| manifest.files.iter().any(|file| file.name == name));
+        go_back(&mut manifest, step);
+        save_manifest(&self.folder.join(MANIFEST), &manifest)
+    }
+
     /// Forgets all that was done.
     ///
     /// # Errors
@@ -258,6 +281,7 @@ impl Workspace {
     pub fn start_again(&self) -> Result<(), StoreError> {
         let mut manifest = self.manifest();
         go_back(&mut manifest, Step::Read);
+        manifest.findings.clear();
         save_manifest(&self.folder.join(MANIFEST), &manifest)
     }
 
@@ -276,8 +300,14 @@ impl Workspace {
     fn is_in_place_by(&self, manifest: &Manifest) -> bool {
         next_step(manifest).is_none()
             && !self.part.exists()
-            && written(manifest)
-                .is_some_and(|file| check_output(&self.output, &file, &self.scratch).is_ok())
+            && written(manifest).is_some_and(|file| {
+                check_output(self.output(manifest), &file, &self.scratch).is_ok()
+            })
+    }
+
+    /// Where the file of the level under way goes.
+    fn output(&self, manifest: &Manifest) -> &Path {
+        &self.outputs[finished_levels(manifest).min(self.outputs.len() - 1)]
     }
 
     /// Puts the finished output in its place.
@@ -285,9 +315,11 @@ impl Workspace {
     /// # Errors
     /// The output cannot be renamed.
     pub fn put_in_place(&self) -> Result<(), StoreError> {
-        std::fs::rename(&self.part, &self.output)
-            .map_err(|e| StoreError::io("put in place", &self.output, e))?;
-        sync_folder(parent_of(&self.output))
+        let manifest = self.manifest();
+        let output = self.output(&manifest);
+        std::fs::rename(&self.part, output)
+            .map_err(|e| StoreError::io("put in place", output, e))?;
+        sync_folder(parent_of(output))
     }
 
     /// Removes the folder and all that is ours in it.

@@ -83,6 +83,8 @@ pub struct DiskSteps {
     pub flood: u64,
     /// Regions become signs.
     pub relabel: u64,
+    /// The threshold is chosen: as the next two at one time; 0 without `--max-triangles`.
+    pub choose: u64,
     /// Cells get their vertices.
     pub place: u64,
     /// Surfaces in one cell are kept apart.
@@ -97,10 +99,11 @@ impl DiskSteps {
     /// The largest of them.
     #[must_use]
     pub fn peak(&self) -> u64 {
-        let Self { read, bin, settle, scan, patch, flood, relabel, place, separate, write, prove } =
-            *self;
-        let all = [read, bin, settle, scan, patch, flood, relabel, place, separate, write, prove];
-        all.into_iter().max().unwrap_or(0)
+        let Self { read, bin, settle, scan, patch, flood, relabel, choose, .. } = *self;
+        let Self { place, separate, write, prove, .. } = *self;
+        let before = [read, bin, settle, scan, patch, flood, relabel, choose];
+        let all = before.into_iter().chain([place, separate, write, prove]);
+        all.max().unwrap_or(0)
     }
 }
 
@@ -157,6 +160,7 @@ impl DiskModel<'_> {
             patch: (kept + bins + drops + hits + faces + 2.0 * flips) as u64,
             flood: (kept + hits + flips + regions) as u64,
             relabel: (kept + hits + flips + regions + signs) as u64,
+            choose: (kept + hits + flips + signs + cells + 2.0 * surface) as u64,
             place: (kept + hits + flips + signs + cells) as u64,
             // Two looks, or the last one and the surface.
             separate: (kept + signs + cells + 2.0 * surface) as u64,

@@ -77,6 +77,19 @@ pub struct Estimate {
     pub threads: usize,
 }
 
+impl Estimate {
+    /// [`Estimate::disk_bytes`] for so many levels of detail: their files are there together, and
+    /// the signs until the last one.
+    #[must_use]
+    pub fn disk_bytes_with_levels(&self, levels: u64) -> u64 {
+        let Some(before) = levels.checked_sub(1).filter(|before| *before > 0) else {
+            return self.disk_bytes;
+        };
+        let signs = self.disk.relabel - self.disk.flood + 1;
+        self.disk.peak().max(self.disk.prove + signs) + before * self.output_bytes
+    }
+}
+
 /// Predicts what [`crate::repair::repair`] would take to write `format`.
 ///
 /// Reads the input once. What the reader spills lies in the folder that `limits` names for work,
@@ -91,6 +104,7 @@ pub fn estimate(
     limits: &Limits,
     monitor: &dyn Monitor,
 ) -> Result<Estimate, RepairError> {
+    settings.check()?;
     let plan = MemoryPlan::within(limits)?;
     let input_format = crate::io::detect(input).map_err(RepairError::Input)?;
     let total = std::fs::metadata(input).map_or(0, |m| m.len());
@@ -111,7 +125,10 @@ pub fn estimate(
     let reader_bytes = scratch.written_bytes();
     let disk_model = DiskModel { sums: &sums, counts: &counts, plan: &plan, format, reader_bytes };
     let files = disk_model.files();
-    let disk = disk_model.steps(&files);
+    let mut disk = disk_model.steps(&files);
+    if settings.max_triangles.is_none() {
+        disk.choose = 0;
+    }
     let memory_model = MemoryModel {
         sums: &sums,
         counts: &counts,

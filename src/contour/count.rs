@@ -1,0 +1,52 @@
+//! Counts the triangles of a surface that is placed, without writing them.
+//!
+//! In:         cells of all bricks.
+//! Out:        as many as [`crate::contour::write_surface`] would write.
+//! Memory:     4 bytes a brick, and what the [`Maker`] holds.
+
+use crate::contour::maker::Maker;
+use crate::contour::mdc::Layers;
+use crate::contour::write::number_vertices;
+use crate::contour::{ContourError, ContourOptions};
+use crate::monitor::{Gauge, Resident};
+use crate::octree::Domain;
+use crate::store::{BrickFile, Resources, StoreError, ordered_by_weight};
+
+/// How many triangles the vertices in `cells`, and in the bricks of `surface` that stand for them,
+/// span.
+///
+/// # Errors
+/// [`ContourError`].
+pub fn count_triangles(
+    (cells, surface): (&BrickFile, &BrickFile),
+    domain: &Domain,
+    options: &ContourOptions,
+    resources: &Resources,
+) -> Result<u64, ContourError> {
+    let cells = Layers::new(cells, Some(surface));
+    let bases = number_vertices(&cells)?;
+    let (method, factor) = (options.method, options.method.factors().plain);
+    let mut numbers = 0..cells.bricks();
+    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
+    let mut triangles = 0;
+    ordered_by_weight(
+        resources.pool,
+        resources.scales(|number: &usize| factor * cells.record_bytes(*number)),
+        || {
+            if resources.monitor.cancelled() {
+                return Err(ContourError::Store(StoreError::Cancelled));
+            }
+            Ok(numbers.next())
+        },
+        || Maker::new(method, cells, &bases, domain, false),
+        |maker, number| {
+            let _brick = resident.hold(1);
+            Ok(maker.triangles(number)?.indices.len() as u64)
+        },
+        |more| {
+            triangles += more;
+            Ok(())
+        },
+    )?;
+    Ok(triangles)
+}
