@@ -352,6 +352,7 @@ fn links_in_the_documents_lead_somewhere() {
         "docs/format.md",
         "docs/outcome.md",
         "docs/estimate.md",
+        "docs/benchmarks/peers.md",
         "docs/glossary.md",
         "testdata/README.md",
     ];
