@@ -16,16 +16,14 @@
 //!             edges, was found by going through all cells; the face points after Ju and Udeshi
 //!             2006.
 
-use crate::contour::mdc::around_cell::AroundCell;
-use crate::contour::mdc::cell::{cell_number, place_of};
 use crate::contour::mdc::layers::Layers;
-use crate::contour::mdc::neighbourhood::{CutBox, Neighbourhood};
+use crate::contour::mdc::look::{Look, Looked, look_at};
+use crate::contour::mdc::neighbourhood::{Neighbourhood, steps_of};
 use crate::contour::mdc::vertices::Workspace;
-use crate::contour::mdc::{HAS_MULTI, INSET_UNITS, face_points, flags_of};
+use crate::contour::mdc::{HAS_MULTI, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
-use crate::geom::triangle_triangle::{Triangle, meets_improperly};
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{BrickKey, Domain, RecordBytes, encode};
+use crate::octree::{BrickKey, Domain, encode};
 use crate::store::{
     BrickFile, BrickWriter, Resources, StoreError, directory_name, ordered_by_weight,
 };
@@ -35,38 +33,6 @@ const RECORD_FACTOR: u64 = 12;
 
 /// Files of one look, in turns.
 pub const LOOKS: [&str; 2] = ["look_odd.bricks", "look_even.bricks"];
-
-/// How cells are looked at.
-#[derive(Clone, Copy, PartialEq, Eq)]
-enum Look {
-    /// For the first time: vertices of flagged leaf cells move to the middle of their crossings.
-    First,
-    /// The same after splits: what has moved stays.
-    FirstAgain,
-    /// Again where vertices have moved: flagged leaf cells get what they need.
-    Second,
-    /// The same after splits, also where nothing has moved.
-    SecondAgain,
-}
-
-impl Look {
-    const fn after_splits(self) -> Self {
-        match self {
-            Self::First | Self::FirstAgain => Self::FirstAgain,
-            Self::Second | Self::SecondAgain => Self::SecondAgain,
-        }
-    }
-}
-
-/// What one look does to a brick.
-struct Looked {
-    key: BrickKey,
-    flags: u32,
-    /// `None` where nothing changes.
-    bytes: Option<RecordBytes>,
-    /// Clusters to split.
-    banned: Vec<u32>,
-}
 
 /// Finds what must change in the bricks of `cells`, which were made from `signs`.
 ///
@@ -208,7 +174,7 @@ impl Separation<'_> {
         for (number, _) in banned {
             let position = BrickKey(self.cells.directory()[*number].key).position();
             for slot in 0..27 {
-                let steps = crate::contour::mdc::neighbourhood::steps_of(slot);
+                let steps = steps_of(slot);
                 let around: [i64; 3] =
                     std::array::from_fn(|a| i64::from(position[a]) + i64::from(steps[a]));
                 if around.iter().any(|c| *c < 0) {
@@ -222,153 +188,4 @@ impl Separation<'_> {
         }
         near
     }
-}
-
-/// What a look decides about one cell.
-enum Decision {
-    /// Its triangles cannot meet.
-    Sound,
-    /// It is flagged, and its vertices go there.
-    Flagged(Vec<(u64, [i32; 3])>),
-    /// It is a cluster that must not be.
-    Split,
-}
-
-/// Looks at one brick; at its cells only if it `is_wanted`.
-fn look_at(
-    nb: &mut Neighbourhood,
-    layers: &Layers,
-    number: usize,
-    look: Look,
-    is_wanted: bool,
-) -> Result<Looked, ContourError> {
-    let key = layers.key(number);
-    let mut banned = Vec::new();
-    let mut decisions = Vec::new();
-    if is_wanted && layers.flags(number) & HAS_MULTI != 0 {
-        nb.move_to(number)?;
-        let mut rank = 0;
-        while let Some(&cell) = nb.own().cells.get(rank) {
-            let own = nb.own();
-            let cut = own.vertices[own.firsts[rank] as usize].cut;
-            let first = cut.first();
-            let last = first + (1 << (3 * cut.level()));
-            let cells = &own.cells[rank..];
-            let end = rank + cells.partition_point(|cell| cell_number(*cell) < last);
-            debug_assert!(first <= cell_number(cell));
-            if cut.is_multi() {
-                let low = place_of(first).map(|c| c as i32);
-                let cut_box = CutBox { low, side: 1 << cut.level() };
-                match decide(nb, cut_box, rank..end, look, cut.is_flagged())? {
-                    Decision::Sound => {}
-                    Decision::Flagged(vertices) => decisions.push((first as u16, vertices)),
-                    Decision::Split => banned.push(first as u32 | cut.level() << 15),
-                }
-            }
-            rank = end;
-        }
-    }
-    let was_anew = layers.is_anew(number);
-    if decisions.is_empty() && !was_anew {
-        return Ok(Looked { key, flags: 0, bytes: None, banned });
-    }
-    let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
-    if is_wanted {
-        brick.flagged.clear();
-    }
-    for (first, vertices) in decisions {
-        brick.flagged.push(first);
-        for (id, position) in vertices {
-            brick.positions[(id & 0xff_ffff) as usize] = position;
-        }
-    }
-    let flags = flags_of(&brick);
-    Ok(Looked { key, flags, bytes: Some(encode(&brick)), banned })
-}
-
-fn decide(
-    nb: &mut Neighbourhood,
-    cut: CutBox,
-    ranks: std::ops::Range<usize>,
-    look: Look,
-    was_flagged: bool,
-) -> Result<Decision, ContourError> {
-    let around = AroundCell::gather(nb, cut, ranks)?;
-    if cut.side > 1 {
-        // The middle of a few crossings is no place for a vertex that stands for many.
-        let is_clash = around.is_torn || clash(&around, AroundCell::variants);
-        return Ok(if is_clash { Decision::Split } else { Decision::Sound });
-    }
-    let may_clash = match look {
-        Look::First => true,
-        Look::FirstAgain | Look::SecondAgain => !was_flagged,
-        // Nothing has changed where no vertex moved.
-        Look::Second => around.is_near_flagged,
-    };
-    let keeps_flag = was_flagged && look != Look::Second;
-    let is_clash = keeps_flag || (may_clash && clash(&around, AroundCell::variants));
-    if !is_clash {
-        return Ok(Decision::Sound);
-    }
-    match look {
-        Look::FirstAgain if was_flagged => return Ok(Decision::Flagged(around.vertices)),
-        Look::First | Look::FirstAgain => {
-            return Ok(Decision::Flagged(middles(&around, cut, nb.cell_units())));
-        }
-        Look::Second | Look::SecondAgain => {}
-    }
-    if !clash(&around, AroundCell::cone) {
-        return Ok(Decision::Flagged(around.vertices));
-    }
-    let mut moved = around;
-    moved.vertices = middles(&moved, cut, nb.cell_units());
-    if clash(&moved, AroundCell::cone) {
-        moved.vertices = between_face_points(&moved);
-    }
-    Ok(Decision::Flagged(moved.vertices))
-}
-
-/// Whether triangles at different vertices of the cell meet.
-fn clash(
-    around: &AroundCell,
-    triangles: impl Fn(&AroundCell, (u64, [i32; 3])) -> Vec<Triangle>,
-) -> bool {
-    let all: Vec<_> = around.vertices.iter().map(|vertex| triangles(around, *vertex)).collect();
-    all.iter().enumerate().any(|(i, some)| {
-        all[i + 1..].iter().any(|others| {
-            some.iter().any(|one| others.iter().any(|other| meets_improperly(one, other)))
-        })
-    })
-}
-
-/// The vertices in the middle of the crossings around them.
-fn middles(around: &AroundCell, cut: CutBox, cell_units: i32) -> Vec<(u64, [i32; 3])> {
-    let inset = INSET_UNITS as i32;
-    let low = cut.low.map(|c| c * cell_units);
-    let side = cut.side * cell_units;
-    let middle = |id: u64| {
-        let corners = around.corners.iter().filter(|corner| corner.vertex == id);
-        let (mut sum, mut count) = ([0_i64; 3], 0);
-        for corner in corners {
-            sum = std::array::from_fn(|a| sum[a] + i64::from(corner.crossing.0[a]));
-            count += 1;
-        }
-        std::array::from_fn(|a| {
-            let mean = (2 * sum[a] + count).div_euclid(2 * count.max(1)) as i32;
-            mean.clamp(low[a] + inset, low[a] + side - inset)
-        })
-    };
-    around.vertices.iter().map(|(id, _)| (*id, middle(*id))).collect()
-}
-
-/// The vertices between two face points on different faces of a leaf cell: what spans them lies in
-/// the hull of their curve, and those of one leaf cell never meet.
-fn between_face_points(around: &AroundCell) -> Vec<(u64, [i32; 3])> {
-    let place = |id: u64| {
-        let mut arcs = around.arcs.iter().filter(|arc| arc.mine == id);
-        let one = arcs.next().expect("a curve passes faces");
-        let other = arcs.find(|arc| arc.face != one.face).expect("a curve passes two faces");
-        std::array::from_fn(|a| (one.point[a] + other.point[a]) / 2)
-    };
-    around.vertices.iter().map(|(id, _)| (*id, place(*id))).collect()
 }

@@ -10,11 +10,9 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::contour::mdc::cell::{FLIPPED_BIT, JOINED_BIT, components_of, number_at, place_of};
-use crate::contour::mdc::cluster::{
-    CellPlane, ClusterOptions, Clustering, JUDGES_ONLY, Leaves, PlaneHit,
-};
+use crate::contour::mdc::cluster::{ClusterOptions, Clustering, Leaves};
 use crate::contour::mdc::features::{Halo, Place};
-use crate::contour::mdc::leaf_vertex::{Around, WaitingCells};
+use crate::contour::mdc::leaf_vertex::WaitingCells;
 use crate::contour::mdc::table::{NO_FACE, TWO_SIDED};
 use crate::contour::mdc::{INSET_UNITS, flags_of};
 use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method};
@@ -125,8 +123,8 @@ pub struct Workspace {
     pub(super) planes: Vec<SourcePlane>,
     pub(super) normals: Vec<DVec3>,
     pub(super) waiting: WaitingCells,
-    clustering: Option<Clustering>,
-    leaves: Leaves,
+    pub(super) clustering: Option<Clustering>,
+    pub(super) leaves: Leaves,
     /// Cosine of the crease angle.
     pub(super) crease_cosine: f64,
     /// Whether no two planes of the brick differ by more than the crease angle.
@@ -256,56 +254,6 @@ impl Workspace {
         self.normals[1..].iter().all(|normal| normal.dot(*first).powi(2) >= cosine_squared)
     }
 
-    /// The planes of the brick in cells; no leaf yet.
-    fn begin_leaves(&mut self) {
-        let leaves = &mut self.leaves;
-        leaves.components.clear();
-        leaves.hit_starts.clear();
-        leaves.hits.clear();
-        leaves.planes.clear();
-        let cell_units = self.cell_units as f64;
-        leaves.planes.extend(
-            self.planes
-                .iter()
-                .zip(&self.normals[1..])
-                .map(|(plane, &normal)| CellPlane { normal, offset: plane.offset / cell_units }),
-        );
-    }
-
-    /// Adds planes that pass the vertex of the last component to its crossings.
-    pub(super) fn take_in(&mut self, numbers: [u32; 2], at: [usize; 3], vertex: DVec3) {
-        if self.clustering.is_none() {
-            return;
-        }
-        let point = (vertex + DVec3::from(at.map(|c| c as f64)) + 0.5).as_vec3().to_array();
-        for number in numbers.into_iter().filter(|number| *number != 0) {
-            let normal = self.normals[number as usize];
-            let offset = self.planes[number as usize - 1].offset / self.cell_units as f64;
-            self.leaves.planes.push(CellPlane { normal, offset });
-            let plane = (self.leaves.planes.len() - 1) as u32;
-            self.leaves.hits.push(PlaneHit { plane, point });
-        }
-    }
-
-    /// Adds a component of a cell to the leaves, before its vertex is placed.
-    fn add_leaf(&mut self, at: [usize; 3], mask: u8, around: &Around) {
-        let low = DVec3::from(at.map(|c| c as f64)) + 0.5;
-        self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
-        for i in 0..around.count {
-            let point = around.points[i] + low;
-            let plane = match around.normals[i] {
-                0 => {
-                    // A patch has no plane: the signs around tell how the surface faces.
-                    let normal = gradient(mask);
-                    self.leaves.planes.push(CellPlane { normal, offset: normal.dot(point) });
-                    (self.leaves.planes.len() - 1) as u32 | JUDGES_ONLY
-                }
-                normal => normal - 1,
-            };
-            self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
-        }
-    }
-
     /// Whether the edge along `axis` from `at` is crossed.
     #[inline]
     pub(super) fn is_marked(&self, axis: usize, at: [usize; 3]) -> bool {
@@ -425,13 +373,4 @@ impl Workspace {
         self.beyond.insert(neighbour.0, corners);
         Ok(mask)
     }
-}
-
-/// The way from inside to outside in a cell, by the signs of its corners; of unit length.
-fn gradient(mask: u8) -> DVec3 {
-    let sum = (0..8).fold(DVec3::ZERO, |sum, corner| {
-        let at = DVec3::from([0, 1, 2].map(|a| f64::from(corner >> a & 1) - 0.5));
-        if mask >> corner & 1 == 1 { sum - at } else { sum + at }
-    });
-    sum.normalize_or(DVec3::X)
 }

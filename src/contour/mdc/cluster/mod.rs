@@ -13,6 +13,7 @@
 //!             rule are additions of ours.
 
 mod cut;
+mod judge;
 mod node;
 mod planes;
 
@@ -25,12 +26,10 @@ use glam::DVec3;
 
 pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
 
-use crate::contour::mdc::cell::{
-    AMBIGUOUS_FACES, cell_mask, cell_number, components_of, number_at, place_of, segments_on,
-};
-use crate::contour::mdc::cluster::cut::{Cut, Mark};
+use crate::contour::mdc::cell::{cell_number, components_of, number_at, place_of, segments_on};
+use crate::contour::mdc::cluster::cut::Cut;
 use crate::contour::mdc::cluster::node::Node;
-use crate::contour::mdc::cluster::planes::{Group, add_group, largest_distance, place};
+use crate::contour::mdc::cluster::planes::{Group, add_group};
 use crate::geom::qef::QefOptions;
 use crate::octree::{CellBrick, MAX_LEVEL, SIDE};
 
@@ -320,107 +319,6 @@ impl Clustering {
         }
         self.groups.truncate(first_group);
         self.groups.extend_from_slice(&self.merged_groups);
-    }
-
-    /// Makes the cell a cluster if all its pieces allow it; whether a larger one may still be.
-    fn judge(&mut self, cut: &mut Cut, cell: &Cell, first_node: usize, mark: &Mark) -> bool {
-        let pieces = &self.nodes[first_node..];
-        if pieces.iter().any(|node| node.groups == Node::TOO_MANY) {
-            self.refusals.by_error += 1;
-            return false;
-        }
-        let is_simple = pieces.iter().all(Node::is_simple)
-            && pieces.len() <= usize::from(u8::MAX)
-            && !self.shares_ambiguous_face(cut, cell);
-        if !is_simple {
-            self.refusals.by_shape += 1;
-            return true;
-        }
-        let mut placed = std::mem::take(&mut cut.placed);
-        placed.clear();
-        let mut largest = 0.0_f64;
-        let fits = (first_node..self.nodes.len()).all(|node| {
-            let vertex = self.place(cut, cell, node);
-            placed.extend(vertex.map(|(vertex, _)| vertex));
-            largest = vertex.map_or(largest, |(_, error)| largest.max(error));
-            vertex.is_some()
-        });
-        if fits && !cut.is_banned(cell) {
-            self.refusals.largest_error = self.refusals.largest_error.max(largest);
-            cut.collapse(cell, mark, &placed, &self.node_of, first_node);
-        }
-        cut.placed = placed;
-        self.refusals.by_error += u64::from(!fits);
-        fits
-    }
-
-    /// Whether a piece has both segments of an ambiguous face on the cell's boundary.
-    fn shares_ambiguous_face(&self, cut: &Cut, cell: &Cell) -> bool {
-        let last = (1_usize << cell.level) - 1;
-        cell.leaves.clone().any(|rank| {
-            let packed = cut.brick.cells[rank];
-            let mut faces = AMBIGUOUS_FACES[usize::from(cell_mask(packed))];
-            if faces == 0 {
-                return false;
-            }
-            let at = place_of(cell_number(packed));
-            while faces != 0 {
-                let face = faces.trailing_zeros() as usize;
-                faces &= faces - 1;
-                let bound = if face & 1 == 1 { last } else { 0 };
-                if at[face / 2] & last != bound {
-                    continue;
-                }
-                let [one, other] = [0, 1].map(|i| {
-                    let edge = segments_on(packed, face).pairs()[i][0];
-                    self.node_of[cut.component(rank, usize::from(edge))]
-                });
-                if one == other {
-                    return true;
-                }
-            }
-            false
-        })
-    }
-
-    /// The vertex of a piece on the lattice, and its largest distance to a plane; `None` if that is
-    /// beyond the threshold.
-    fn place(&self, cut: &Cut, cell: &Cell, number: usize) -> Option<([i32; 3], f64)> {
-        let node = &self.nodes[number];
-        let ClusterOptions { cell_units, inset_units, .. } = self.options;
-        let size = (1 << cell.level) as f64;
-        let low = place_of(cell.number).map(|c| (c << cell.level) as f64);
-        let half = size * 0.5;
-        let centre = DVec3::from(low) + half;
-        let reach = half - inset_units as f64 / cell_units as f64;
-        let mut options = self.options.qef;
-        (options.lo, options.hi) = (DVec3::splat(-reach), DVec3::splat(reach));
-        let first = node.first_group as usize;
-        let groups = &self.groups[first..first + node.groups as usize];
-        let middle = node.points / node.count.max(1.0);
-        let planes = &cut.leaves.planes;
-        let solution = place(groups, planes, centre, middle, &options);
-        if solution.clamped {
-            return None;
-        }
-        let at = solution.position + centre;
-        let vertex: [i32; 3] = std::array::from_fn(|a| {
-            let low = low[a] as i64 * cell_units;
-            let units = (at[a] * cell_units as f64).round() as i64;
-            units.clamp(low + inset_units, low + size as i64 * cell_units - inset_units) as i32
-        });
-        let at = DVec3::from(vertex.map(f64::from)) / cell_units as f64;
-        let threshold = self.options.threshold_cells;
-        let mut largest = 0.0_f64;
-        for component in cut.components_in(&cell.leaves) {
-            if self.node_of[component] as usize == number {
-                largest = largest.max(largest_distance(cut.hits_of(component), planes, at));
-                if largest > threshold {
-                    return None;
-                }
-            }
-        }
-        Some((vertex, largest))
     }
 }
 

@@ -1,0 +1,70 @@
+//! Gathers what clusters are made of: the planes of a brick, and the crossings of its components.
+//!
+//! Units: cells, from the brick's min corner.
+
+use glam::DVec3;
+
+use crate::contour::mdc::cluster::{CellPlane, JUDGES_ONLY, PlaneHit};
+use crate::contour::mdc::leaf_vertex::Around;
+use crate::contour::mdc::vertices::Workspace;
+
+impl Workspace {
+    /// The planes of the brick in cells; no leaf yet.
+    pub(super) fn begin_leaves(&mut self) {
+        let leaves = &mut self.leaves;
+        leaves.components.clear();
+        leaves.hit_starts.clear();
+        leaves.hits.clear();
+        leaves.planes.clear();
+        let cell_units = self.cell_units as f64;
+        leaves.planes.extend(
+            self.planes
+                .iter()
+                .zip(&self.normals[1..])
+                .map(|(plane, &normal)| CellPlane { normal, offset: plane.offset / cell_units }),
+        );
+    }
+
+    /// Adds planes that pass the vertex of the last component to its crossings.
+    pub(super) fn take_in(&mut self, numbers: [u32; 2], at: [usize; 3], vertex: DVec3) {
+        if self.clustering.is_none() {
+            return;
+        }
+        let point = (vertex + DVec3::from(at.map(|c| c as f64)) + 0.5).as_vec3().to_array();
+        for number in numbers.into_iter().filter(|number| *number != 0) {
+            let normal = self.normals[number as usize];
+            let offset = self.planes[number as usize - 1].offset / self.cell_units as f64;
+            self.leaves.planes.push(CellPlane { normal, offset });
+            let plane = (self.leaves.planes.len() - 1) as u32;
+            self.leaves.hits.push(PlaneHit { plane, point });
+        }
+    }
+
+    /// Adds a component of a cell to the leaves, before its vertex is placed.
+    pub(super) fn add_leaf(&mut self, at: [usize; 3], mask: u8, around: &Around) {
+        let low = DVec3::from(at.map(|c| c as f64)) + 0.5;
+        self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
+        for i in 0..around.count {
+            let point = around.points[i] + low;
+            let plane = match around.normals[i] {
+                0 => {
+                    // A patch has no plane: the signs around tell how the surface faces.
+                    let normal = gradient(mask);
+                    self.leaves.planes.push(CellPlane { normal, offset: normal.dot(point) });
+                    (self.leaves.planes.len() - 1) as u32 | JUDGES_ONLY
+                }
+                normal => normal - 1,
+            };
+            self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
+        }
+    }
+}
+
+/// The way from inside to outside in a cell, by the signs of its corners; of unit length.
+fn gradient(mask: u8) -> DVec3 {
+    let sum = (0..8).fold(DVec3::ZERO, |sum, corner| {
+        let at = DVec3::from([0, 1, 2].map(|a| f64::from(corner >> a & 1) - 0.5));
+        if mask >> corner & 1 == 1 { sum - at } else { sum + at }
+    });
+    sum.normalize_or(DVec3::X)
+}
