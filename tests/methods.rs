@@ -89,3 +89,20 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn what_dual_contouring_does_not_promise_is_told_and_the_file_is_kept() {
+    let workshop = Workshop::new();
+    let input =
+        workshop.write(&random_triangles(400, 0.3, &mut Random::new(3)), Encoding::BinaryStl);
+    let settings = Settings { method: Method::Dc, ..at_depth(6) };
+    let repaired =
+        workshop.repair(&input, "ply", &settings, &Default::default()).expect("a file in place");
+    assert_eq!(repaired.outcome.verdict, Verdict::Fail);
+    assert!(repaired.outcome.output.proof.nonmanifold_edges > 0);
+    assert!(repaired.outcome.reasons[0].contains("not sound"), "{:?}", repaired.outcome.reasons);
+    assert!(repaired.outcome.output.caveat.is_some() && repaired.path.exists());
+    let sound = Settings { method: Method::Mdc, ..settings };
+    let other = workshop.repair(&input, "ply", &sound, &Default::default()).expect("a result");
+    assert!(other.outcome.output.proof.holds());
+}
