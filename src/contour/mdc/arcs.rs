@@ -11,7 +11,7 @@ use crate::contour::ContourError;
 use crate::contour::mdc::cell::{edge_in_cell, lower_end, segments_on};
 use crate::contour::mdc::loaded::face_point_key;
 use crate::contour::mdc::neighbourhood::{CutBox, Neighbourhood, Patch};
-use crate::contour::mdc::table::axis_of_edge;
+use crate::contour::mdc::table::{axis_of_edge, edge_at_corner};
 
 /// An edge of the grid: its direction and its lower end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -23,19 +23,41 @@ pub struct Edge {
 }
 
 impl Edge {
-    /// The four cells around it, counted around its direction: (-,-), (+,-), (+,+), (-,+) on the two
-    /// axes after its own.
+    /// The vertices of the four cells around it, counted around its direction: (-,-), (+,-), (+,+),
+    /// (-,+) on the two axes after its own.
+    ///
+    /// # Errors
+    /// [`ContourError::Contradiction`].
     #[inline]
-    fn cells(&self) -> [[i32; 3]; 4] {
-        let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
-        [(1, 1), (0, 1), (0, 0), (1, 0)].map(|(du, dv)| {
-            let mut at = self.lower;
-            at[u] -= du;
-            at[v] -= dv;
-            at
-        })
+    pub fn ring(&self, nb: &mut Neighbourhood) -> Result<[Patch; 4], ContourError> {
+        let mut ring = [None; 4];
+        for (patch, (down, number)) in ring.iter_mut().zip(AROUND[self.axis]) {
+            let found = nb.cell(std::array::from_fn(|a| self.lower[a] - down[a]))?;
+            *patch = Some(nb.vertex(found, number));
+        }
+        Ok(ring.map(|patch| patch.expect("all four are found")))
     }
 }
+
+/// The four cells around the lower edge of a cell along each axis: the axes along which each lies
+/// one step down, and the number of the edge there.
+const AROUND: [[([i32; 3], u8); 4]; 3] = {
+    let mut around = [[([0; 3], 0); 4]; 3];
+    let mut axis = 0;
+    while axis < 3 {
+        let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
+        let downs = [u | v, v, 0, u];
+        let mut slot = 0;
+        while slot < 4 {
+            let down: u8 = downs[slot];
+            let steps = [(down & 1) as i32, (down >> 1 & 1) as i32, (down >> 2) as i32];
+            around[axis][slot] = (steps, edge_at_corner(down, axis as u8));
+            slot += 1;
+        }
+        axis += 1;
+    }
+    around
+};
 
 /// The arc between two cells of the cut.
 #[derive(Clone, Copy, Debug)]
@@ -176,12 +198,7 @@ impl Polygon {
     /// # Errors
     /// [`ContourError::Contradiction`].
     pub fn around(nb: &mut Neighbourhood, edge: Edge) -> Result<Option<Self>, ContourError> {
-        let mut ring = [None; 4];
-        for (slot, at) in ring.iter_mut().zip(edge.cells()) {
-            let found = nb.cell(at)?;
-            *slot = Some(nb.vertex(found, edge_in_cell(edge.axis, edge.lower, at)));
-        }
-        Ok(Self::of_ring(edge, ring.map(|patch| patch.expect("all four are found"))))
+        Ok(Self::of_ring(edge, edge.ring(nb)?))
     }
 
     /// The polygon of these four vertices; `None` if fewer than three differ.

@@ -1,6 +1,7 @@
 //! What surrounds a cell of the cut that has several vertices: its arcs and its polygons.
 //!
-//! Source: section headings of the method stand in `separate`.
+//! Units:  lattice units from the own brick's min corner.
+//! Source: ours; see `separate`.
 
 use crate::contour::ContourError;
 use crate::contour::mdc::arcs::{Arc, Edge, Polygon, edges_of};

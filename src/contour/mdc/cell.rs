@@ -1,8 +1,8 @@
 //! Cells as they are packed in records, and how their faces join their crossed edges.
 
 use crate::contour::mdc::table::{
-    Components, FLIPPED, JOINED, TABLE, TWO_SIDED, corner_of_edge, corners_of_face, edge_at_corner,
-    edges_of_face, is_ambiguous, is_marked, other_axes,
+    Components, FLIPPED, JOINED, Segments, TABLE, TWO_SIDED, corner_of_edge, edge_at_corner,
+    is_ambiguous, segments,
 };
 
 /// Flag of a cell whose two-sided face is flipped, beside its number and mask.
@@ -96,24 +96,9 @@ pub static AMBIGUOUS_FACES: [u8; 256] = {
     faces
 };
 
-/// The pairs of crossed edges that a face joins, by their numbers in the cell.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Segments {
-    count: u8,
-    pairs: [[u8; 2]; 2],
-}
-
-impl Segments {
-    /// The pairs.
-    #[inline]
-    pub fn pairs(&self) -> &[[u8; 2]] {
-        &self.pairs[..usize::from(self.count)]
-    }
-}
-
 /// Of every mask and face, without and with the flip of its two-sided face.
 static SEGMENTS: [[[Segments; 6]; 256]; 2] = {
-    let none = Segments { count: 0, pairs: [[0; 2]; 2] };
+    let none = Segments::NONE;
     let mut all = [[[none; 6]; 256]; 2];
     let mut mask = 0;
     while mask < 256 {
@@ -128,37 +113,6 @@ static SEGMENTS: [[[Segments; 6]; 256]; 2] = {
     }
     all
 };
-
-const fn segments(mask: u8, face: u8, flipped: bool) -> Segments {
-    let mut out = Segments { count: 0, pairs: [[0; 2]; 2] };
-    if is_ambiguous(mask, face) {
-        let (first, second) = other_axes(face / 2);
-        let corners = corners_of_face(face);
-        let mut i = 0;
-        while i < 4 {
-            let inside = mask >> corners[i] & 1 == 1;
-            if inside != flipped {
-                out.pairs[out.count as usize] =
-                    [edge_at_corner(corners[i], first), edge_at_corner(corners[i], second)];
-                out.count += 1;
-            }
-            i += 1;
-        }
-        return out;
-    }
-    let edges = edges_of_face(face);
-    let mut found = 0;
-    let mut i = 0;
-    while i < 4 {
-        if is_marked(mask, edges[i]) {
-            out.pairs[0][found] = edges[i];
-            found += 1;
-        }
-        i += 1;
-    }
-    out.count = (found == 2) as u8;
-    out
-}
 
 /// How `face` of a packed cell joins its crossed edges.
 #[inline]
@@ -189,7 +143,7 @@ pub fn edges_of_mask(edges: u16) -> impl Iterator<Item = u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contour::mdc::table::components;
+    use crate::contour::mdc::table::{components, is_marked};
 
     #[test]
     fn numbers_and_places_are_each_others_inverse() {

@@ -123,20 +123,17 @@ fn decide(
     was_flagged: bool,
 ) -> Result<Decision, ContourError> {
     let around = AroundCell::gather(nb, cut, ranks)?;
+    if look == Look::Second && !around.is_near_flagged {
+        // Nothing has changed where no vertex moved.
+        return Ok(Decision::Sound);
+    }
     if cut.side > 1 {
         // The middle of a few crossings is no place for a vertex that stands for many.
         let is_clash = around.is_torn || clash(&around, AroundCell::variants);
         return Ok(if is_clash { Decision::Split } else { Decision::Sound });
     }
-    let may_clash = match look {
-        Look::First => true,
-        Look::FirstAgain | Look::SecondAgain => !was_flagged,
-        // Nothing has changed where no vertex moved.
-        Look::Second => around.is_near_flagged,
-    };
     let keeps_flag = was_flagged && look != Look::Second;
-    let is_clash = keeps_flag || (may_clash && clash(&around, AroundCell::variants));
-    if !is_clash {
+    if !keeps_flag && !clash(&around, AroundCell::variants) {
         return Ok(Decision::Sound);
     }
     match look {

@@ -80,6 +80,15 @@ pub const fn steps_of(slot: usize) -> [i32; 3] {
     [slot as i32 % 3 - 1, slot as i32 / 3 % 3 - 1, slot as i32 / 9 - 1]
 }
 
+/// The brick in slot `slot` around `key`; `None` below the grid.
+pub fn brick_around(key: BrickKey, slot: usize) -> Option<BrickKey> {
+    let (mut position, steps) = (key.position(), steps_of(slot));
+    for (coordinate, step) in position.iter_mut().zip(steps) {
+        *coordinate = coordinate.checked_add_signed(step)?;
+    }
+    Some(BrickKey::new(position))
+}
+
 /// See the module.
 pub struct Neighbourhood<'f> {
     layers: Layers<'f>,
@@ -155,13 +164,7 @@ impl<'f> Neighbourhood<'f> {
     fn brick(&mut self, slot: usize) -> Result<Option<&Loaded>, ContourError> {
         if self.bricks[slot].is_none() {
             let steps = steps_of(slot);
-            let position = self.key.position();
-            let moved: [i64; 3] =
-                std::array::from_fn(|a| i64::from(position[a]) + i64::from(steps[a]));
-            if moved.iter().any(|c| *c < 0) {
-                return Ok(None);
-            }
-            let key = BrickKey::new(moved.map(|c| c as u32));
+            let Some(key) = brick_around(self.key, slot) else { return Ok(None) };
             let Some(number) = self.layers.find(key) else { return Ok(None) };
             let units = self.domain.brick_units();
             let loaded =

@@ -9,7 +9,6 @@ use crate::contour::mdc::cell::{cell_mask, cell_number, place_of};
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};
 use crate::contour::mdc::shape::{Loop, LoopPoint, Shape};
-use crate::contour::mdc::table::edge_at_corner;
 use crate::contour::mdc::triangulate::{Cut, Quad};
 use crate::contour::{ContourError, ContourStats};
 use crate::octree::Domain;
@@ -53,26 +52,6 @@ pub struct Polygons<'p> {
     is_careful: bool,
     with_corners: bool,
 }
-
-/// The four cells around the lower edge of a cell along each axis: the axes along which each lies
-/// one step down, and the number of the edge there.
-const AROUND: [[([i32; 3], u8); 4]; 3] = {
-    let mut around = [[([0; 3], 0); 4]; 3];
-    let mut axis = 0;
-    while axis < 3 {
-        let (u, v) = (1 << ((axis + 1) % 3), 1 << ((axis + 2) % 3));
-        let downs = [u | v, v, 0, u];
-        let mut slot = 0;
-        while slot < 4 {
-            let down: u8 = downs[slot];
-            let steps = [(down & 1) as i32, (down >> 1 & 1) as i32, (down >> 2) as i32];
-            around[axis][slot] = (steps, edge_at_corner(down, axis as u8));
-            slot += 1;
-        }
-        axis += 1;
-    }
-    around
-};
 
 /// A corner of a triangle.
 #[derive(Clone, Copy)]
@@ -149,7 +128,7 @@ impl<'p> Polygons<'p> {
         inside_below: bool,
         out: &mut BrickTriangles,
     ) -> Result<(), ContourError> {
-        let ring = self.ring(&edge)?;
+        let ring = edge.ring(&mut self.nb)?;
         let crossing = self.nb.crossing_at(edge.axis, edge.lower, offset);
         if ring.iter().all(|patch| patch.vertex.cut.is_plain()) {
             out.stats.polygons += 1;
@@ -214,18 +193,6 @@ impl<'p> Polygons<'p> {
             self.add(&[numbers.map(|i| corners[i])], inside_below, out);
         }
         Ok(())
-    }
-
-    /// The four vertices around an edge.
-    #[inline]
-    fn ring(&mut self, edge: &Edge) -> Result<[Patch; 4], ContourError> {
-        let mut ring = [None; 4];
-        for (patch, (down, number)) in ring.iter_mut().zip(AROUND[edge.axis]) {
-            let at = std::array::from_fn(|a| edge.lower[a] - down[a]);
-            let found = self.nb.cell(at)?;
-            *patch = Some(self.nb.vertex(found, number));
-        }
-        Ok(ring.map(|patch| patch.expect("all four are found")))
     }
 
     #[inline]

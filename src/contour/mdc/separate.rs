@@ -18,7 +18,7 @@
 
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::look::{Look, Looked, look_at};
-use crate::contour::mdc::neighbourhood::{Neighbourhood, steps_of};
+use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
 use crate::contour::mdc::vertices::Workspace;
 use crate::contour::mdc::{HAS_MULTI, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
@@ -172,18 +172,10 @@ impl Separation<'_> {
     fn near(&self, banned: &Banned) -> Vec<bool> {
         let mut near = vec![false; self.cells.len()];
         for (number, _) in banned {
-            let position = BrickKey(self.cells.directory()[*number].key).position();
-            for slot in 0..27 {
-                let steps = steps_of(slot);
-                let around: [i64; 3] =
-                    std::array::from_fn(|a| i64::from(position[a]) + i64::from(steps[a]));
-                if around.iter().any(|c| *c < 0) {
-                    continue;
-                }
-                let key = BrickKey::new(around.map(|c| c as u32));
-                if let Some(number) = self.cells.find(key.0) {
-                    near[number] = true;
-                }
+            let key = BrickKey(self.cells.directory()[*number].key);
+            let around = (0..27).filter_map(|slot| brick_around(key, slot));
+            for number in around.filter_map(|key| self.cells.find(key.0)) {
+                near[number] = true;
             }
         }
         near

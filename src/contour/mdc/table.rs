@@ -149,9 +149,29 @@ pub const fn components(mask: u8, flipped_face: u8) -> Components {
     number(label)
 }
 
-/// Joins the labels of those edges that `face` connects.
-const fn join_on_face(mut label: [u8; 12], mask: u8, face: u8, flipped: bool) -> [u8; 12] {
-    let edges = edges_of_face(face);
+/// The pairs of crossed edges that a face joins, by their numbers in the cell.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Segments {
+    count: u8,
+    pairs: [[u8; 2]; 2],
+}
+
+impl Segments {
+    /// No pair.
+    pub const NONE: Self = Self { count: 0, pairs: [[0; 2]; 2] };
+
+    /// The pairs.
+    #[inline]
+    pub fn pairs(&self) -> &[[u8; 2]] {
+        &self.pairs[..usize::from(self.count)]
+    }
+}
+
+/// How `face` joins the crossed edges of `mask`: the two that there are, or on an ambiguous face the
+/// two around each inside corner, around each outside corner when it is `flipped`.
+#[must_use]
+pub const fn segments(mask: u8, face: u8, flipped: bool) -> Segments {
+    let mut out = Segments::NONE;
     if is_ambiguous(mask, face) {
         let (first, second) = other_axes(face / 2);
         let corners = corners_of_face(face);
@@ -159,24 +179,34 @@ const fn join_on_face(mut label: [u8; 12], mask: u8, face: u8, flipped: bool) ->
         while i < 4 {
             let inside = mask >> corners[i] & 1 == 1;
             if inside != flipped {
-                let along_first = edge_at_corner(corners[i], first);
-                label = join(label, along_first, edge_at_corner(corners[i], second));
+                out.pairs[out.count as usize] =
+                    [edge_at_corner(corners[i], first), edge_at_corner(corners[i], second)];
+                out.count += 1;
             }
             i += 1;
         }
-        return label;
+        return out;
     }
-    // At most two marks are left: the first joins the second.
-    let mut found = NO_COMPONENT;
+    let edges = edges_of_face(face);
+    let mut found = 0;
     let mut i = 0;
     while i < 4 {
         if is_marked(mask, edges[i]) {
-            if found == NO_COMPONENT {
-                found = edges[i];
-            } else {
-                label = join(label, found, edges[i]);
-            }
+            out.pairs[0][found] = edges[i];
+            found += 1;
         }
+        i += 1;
+    }
+    out.count = (found == 2) as u8;
+    out
+}
+
+/// Joins the labels of those edges that `face` connects.
+const fn join_on_face(mut label: [u8; 12], mask: u8, face: u8, flipped: bool) -> [u8; 12] {
+    let segments = segments(mask, face, flipped);
+    let mut i = 0;
+    while i < segments.count as usize {
+        label = join(label, segments.pairs[i][0], segments.pairs[i][1]);
         i += 1;
     }
     label
