@@ -3,76 +3,12 @@
 mod support;
 
 use brickmend::mesh::shapes::{Corners, Random, cuboid, sphere, volume};
-use brickmend::octree::Domain;
 use brickmend::repair::{Outcome, Settings};
 use brickmend::sign::FillRule;
-use glam::{DMat3, DVec3};
 
 use crate::support::run::{Encoding, Workshop, at_depth, repair_soup, unclustered};
-use crate::support::soups::{specks, turned_cube};
+use crate::support::soups::specks;
 use crate::support::surface::Surface;
-
-/// How far the nearest vertex is from each corner of a turned cube, in cells, and whether the
-/// corner's cell sees its three planes: whether each of them crosses an edge of that cell.
-fn corner_distances(random: &mut Random) -> Vec<(f64, bool)> {
-    let (soup, turn, by) = turned_cube(random);
-    let (outcome, surface) = repair_soup(&soup, &at_depth(5)).expect("a result");
-    assert_eq!(outcome.patch.odd_faces, 0);
-    assert!((surface.proof.volume / 8.0 - 1.0).abs() < 2e-3, "{}", surface.proof.volume);
-    (0..8)
-        .map(|bits| {
-            let sign = |bit: i32| if bits & bit == 0 { -1.0 } else { 1.0 };
-            let corner = turn * DVec3::new(sign(1), sign(2), sign(4)) + by;
-            let distances = surface.vertices.iter().map(|&v| DVec3::from(v).distance(corner));
-            let nearest = distances.fold(f64::INFINITY, f64::min);
-            let seen = planes_seen(&outcome.grid, turn, by, corner);
-            (nearest / outcome.cell_size, seen == [true; 3])
-        })
-        .collect()
-}
-
-/// Which planes of the turned cube cross an edge of the cell that holds `corner`.
-fn planes_seen(grid: &Domain, turn: DMat3, by: DVec3, corner: DVec3) -> [bool; 3] {
-    let units = i64::from(grid.cell_units);
-    let cell = grid.to_units(corner.into()).map(|c| (c as i64).div_euclid(units));
-    let local = |bits: usize| {
-        let at = std::array::from_fn(|a| (cell[a] + (bits >> a & 1) as i64) * units);
-        turn.transpose() * (DVec3::from(grid.to_model(at)) - by)
-    };
-    let mut seen = [false; 3];
-    for low in 0..8 {
-        for axis in (0..3).filter(|axis| low >> axis & 1 == 0) {
-            let ends = [local(low), local(low | 1 << axis)];
-            let depths = ends.map(|p| p.abs().max_element() - 1.0);
-            if depths[0] * depths[1] < 0.0 {
-                // The outer end lies beyond the plane that the edge leaves the cube through last.
-                let (inner, outer) = if depths[0] < 0.0 { (0, 1) } else { (1, 0) };
-                let leaves = |a: usize| {
-                    let (from, to) = (ends[inner][a].abs() - 1.0, ends[outer][a].abs() - 1.0);
-                    if to > 0.0 { from / (from - to) } else { f64::INFINITY }
-                };
-                let first = (0..3).min_by(|&a, &b| leaves(a).total_cmp(&leaves(b)));
-                seen[first.expect("three planes")] = true;
-            }
-        }
-    }
-    seen
-}
-
-#[test]
-fn corners_of_turned_cubes_stay_sharp_where_their_cell_sees_three_planes() {
-    let mut random = Random::new(21);
-    let (mut sharp, mut all) = (0, 0);
-    for pose in 0..20 {
-        for (number, (off, seen)) in corner_distances(&mut random).into_iter().enumerate() {
-            assert!(off < 1.0, "pose {pose}: corner {number} is {off} cells off");
-            assert!(!seen || off < 1e-3, "pose {pose}: corner {number} is {off} cells off");
-            sharp += usize::from(off < 1e-3);
-            all += 1;
-        }
-    }
-    assert!(sharp * 4 > all, "{sharp} of {all} corners are sharp");
-}
 
 #[test]
 fn every_vertex_of_an_axis_parallel_cube_lies_on_its_planes_to_the_bit() {
@@ -209,24 +145,4 @@ fn no_clustering_gives_every_leaf_its_vertices() {
     assert!(clustered.output.contour.cluster_error_cells <= 0.1);
     assert!(lighter.proof.triangles < surface.proof.triangles);
     assert_eq!(lighter.proof.euler_characteristic, surface.proof.euler_characteristic);
-}
-
-#[test]
-fn clusters_lose_no_corner_of_a_turned_cube() {
-    let mut random = Random::new(22);
-    for pose in 0..10 {
-        let (soup, turn, by) = turned_cube(&mut random);
-        let sharp = |settings| {
-            let (outcome, surface) = repair_soup(&soup, settings).expect("a result");
-            let is_sharp = |bits: &i32| {
-                let sign = |bit: i32| if bits & bit == 0 { -1.0 } else { 1.0 };
-                let corner = turn * DVec3::new(sign(1), sign(2), sign(4)) + by;
-                let near = |v: &[f64; 3]| DVec3::from(*v).distance(corner) / outcome.cell_size;
-                surface.vertices.iter().map(near).fold(f64::INFINITY, f64::min) < 1e-3
-            };
-            (0..8).filter(is_sharp).collect::<Vec<i32>>()
-        };
-        let (before, after) = (sharp(&unclustered(6)), sharp(&at_depth(6)));
-        assert!(before.iter().all(|corner| after.contains(corner)), "{pose}: {before:?} {after:?}");
-    }
 }

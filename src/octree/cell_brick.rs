@@ -22,6 +22,22 @@ pub struct FacePoint {
     pub position: [i32; 3],
 }
 
+/// A vertex that belongs into an empty cell beside its own.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
+pub struct VertexReach {
+    /// The number of its leaf cell, which has no other vertex.
+    pub cell: u16,
+    /// The face to pass: twice its axis, and one more on the max side.
+    pub face: u8,
+    /// Whether the vertex is there; else it stays in its own cell.
+    pub is_granted: bool,
+    /// Squared way from the middle of the cell's crossings, in cells: of several that want into one
+    /// cell the nearest goes.
+    pub far: f32,
+    /// Where.
+    pub position: [i32; 3],
+}
+
 /// What contouring leaves of a brick: its cells with their vertices.
 ///
 /// The cut is the set of cells that have vertices of their own: clusters, and the leaf cells that
@@ -40,6 +56,8 @@ pub struct CellBrick {
     pub flagged: Vec<u16>,
     /// Clusters that must not be, as in `clusters` without the number of vertices; ascending.
     pub banned: Vec<u32>,
+    /// Vertices of leaf cells of the cut that belong into a cell beside, by ascending cell.
+    pub reaches: Vec<VertexReach>,
     /// Vertex positions, cell after cell of the cut, component after component.
     pub positions: Vec<[i32; 3]>,
     /// Offsets of the crossings on the cells' own edges (those that leave their min corner), in
@@ -53,8 +71,20 @@ impl ArchiveSize for CellBrick {
     fn archive_bytes(&self) -> usize {
         let words = self.cells.len() + self.clusters.len() + self.banned.len();
         let halves = self.offsets.len() + self.flagged.len();
-        let places = 12 * self.positions.len() + 24 * self.points.len();
+        let places = 12 * self.positions.len() + 24 * self.points.len() + 20 * self.reaches.len();
         4 * words + 2 * halves + self.members.len() + places + 2 * ROOT_BYTES
+    }
+}
+
+impl CellBrick {
+    /// Drops the reaches of leaf cells that a cluster covers.
+    pub fn drop_covered_reaches(&mut self) {
+        let clusters = &self.clusters;
+        self.reaches.retain(|reach| {
+            let after = clusters.partition_point(|c| *c & 0x7fff <= u32::from(reach.cell));
+            let covering = after.checked_sub(1).map(|at| clusters[at]);
+            covering.is_none_or(|c| (c & 0x7fff) + (1 << (3 * (c >> 15 & 7))) <= reach.cell.into())
+        });
     }
 }
 
@@ -76,6 +106,11 @@ pub fn decode_cells(bytes: &[u8]) -> Result<&ArchivedCellBrick, BrickError> {
         .map_err(|source| BrickError::Invalid { kind, source })?;
     if let Some(cell) = brick.cells.iter().find(|cell| cell.to_native() >> 25 != 0) {
         return Err(out_of_range(kind, "cell", cell.to_native().into(), 1 << 25));
+    }
+    let is_reach = |reach: &ArchivedVertexReach| reach.cell.to_native() < 1 << 15 && reach.face < 6;
+    if let Some(reach) = brick.reaches.iter().find(|reach| !is_reach(reach)) {
+        let number = u64::from(reach.face) << 16 | u64::from(reach.cell.to_native());
+        return Err(out_of_range(kind, "reach", number, 6 << 16));
     }
     let is_cluster = |cluster: u32| {
         let (first, level) = (cluster & 0x7fff, cluster >> 15 & 7);

@@ -93,6 +93,25 @@ pub fn turned_cube(random: &mut Random) -> (Vec<Corners>, DMat3, DVec3) {
     (transform(&cuboid([-1.0; 3], [1.0; 3]), turn, by), turn, by)
 }
 
+/// A prism over a convex profile in the plane of x and y, from z = `low` to `high`.
+pub fn prism(profile: &[[f64; 2]], low: f64, high: f64) -> Vec<Corners> {
+    let at = |i: usize, z: f64| {
+        let [x, y] = profile[i % profile.len()];
+        [x, y, z]
+    };
+    let mut triangles = Vec::new();
+    for i in 0..profile.len() {
+        let [p, q] = [at(i, low), at(i + 1, low)];
+        let [r, s] = [at(i + 1, high), at(i, high)];
+        triangles.extend([[p, q, r], [p, r, s]]);
+        if (1..profile.len() - 1).contains(&i) {
+            triangles.push([at(0, low), q, p]);
+            triangles.push([at(0, high), s, r]);
+        }
+    }
+    triangles
+}
+
 /// The longest side of the box.
 pub fn extent(triangles: &[Corners]) -> f64 {
     let [lo, hi] = bounds(triangles);

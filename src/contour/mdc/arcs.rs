@@ -78,11 +78,13 @@ impl Arc {
         face_point_key(self.axis, is_beyond, upper, lower)
     }
 
-    /// The minimal face as the box of the smaller cell, and its plane.
-    fn face(&self) -> (CutBox, i32) {
+    /// The minimal face, which both boxes have: a box without height.
+    fn face(&self) -> CutBox {
         let (lower, upper) = (self.lower.cut_box(), self.upper.cut_box());
-        let smaller = if lower.side < upper.side { lower } else { upper };
-        (smaller, upper.low[self.axis])
+        let mut low: [i32; 3] = std::array::from_fn(|a| lower.low[a].max(upper.low[a]));
+        let mut high: [i32; 3] = std::array::from_fn(|a| lower.high[a].min(upper.high[a]));
+        (low[self.axis], high[self.axis]) = (upper.low[self.axis], upper.low[self.axis]);
+        CutBox { low, high }
     }
 
     /// Whether the face point is a vertex.
@@ -93,42 +95,39 @@ impl Arc {
 
     /// Whether the segment between the two vertices passes strictly through the minimal face.
     pub fn passes(&self, cell_units: i32) -> bool {
-        if self.lower.vertex.cut.level() == self.upper.vertex.cut.level() {
+        if self.lower.vertex.cut.is_as_large_as(self.upper.vertex.cut) {
             // The union of two equal cells is convex.
             return true;
         }
-        let (face, plane) = self.face();
+        let face = self.face();
         let from = self.lower.vertex.position.map(i64::from);
         let to = self.upper.vertex.position.map(i64::from);
         let cell = i64::from(cell_units);
         let whole = to[self.axis] - from[self.axis];
-        let part = i64::from(plane) * cell - from[self.axis];
+        let part = i64::from(face.low[self.axis]) * cell - from[self.axis];
         (0..3).filter(|a| *a != self.axis).all(|a| {
             let at = from[a] * whole + part * (to[a] - from[a]);
-            let low = i64::from(face.low[a]) * cell;
-            let high = low + i64::from(face.side) * cell;
+            let (low, high) = (i64::from(face.low[a]) * cell, i64::from(face.high[a]) * cell);
             low * whole < at && at < high * whole
         })
     }
 
     /// The face point of an arc that leaves its face at these two crossings.
     pub fn point(&self, ends: [[i32; 3]; 2], cell_units: i32) -> [i32; 3] {
-        let (face, plane) = self.face();
+        let face = self.face();
         let [p, q] = ends.map(|end| end.map(i64::from));
         let cell = i64::from(cell_units);
         let middle: [i64; 3] = std::array::from_fn(|a| (p[a] + q[a]) / 2);
-        let low = face.low.map(|c| i64::from(c) * cell);
-        let side = i64::from(face.side) * cell;
-        let is_inside = (0..3)
-            .filter(|a| *a != self.axis)
-            .all(|a| low[a] < middle[a] && middle[a] < low[a] + side);
+        let [low, high] = [face.low, face.high].map(|end| end.map(|c| i64::from(c) * cell));
+        let is_inside =
+            (0..3).filter(|a| *a != self.axis).all(|a| low[a] < middle[a] && middle[a] < high[a]);
         let at: [i64; 3] = if is_inside {
             middle
         } else {
-            std::array::from_fn(|a| (p[a] + q[a] + 2 * low[a] + side) / 4)
+            std::array::from_fn(|a| (p[a] + q[a] + low[a] + high[a]) / 4)
         };
         let mut at = at.map(|c| c as i32);
-        at[self.axis] = plane * cell_units;
+        at[self.axis] = face.low[self.axis] * cell_units;
         at
     }
 
@@ -253,7 +252,7 @@ impl Polygon {
         let Edge { axis, lower } = self.edge;
         let boxes = self.patches().iter().map(Patch::cut_box);
         let (low, high) = boxes.fold((i32::MIN, i32::MAX), |(low, high), cut| {
-            (low.max(cut.low[axis]), high.min(cut.low[axis] + cut.side))
+            (low.max(cut.low[axis]), high.min(cut.high[axis]))
         });
         for along in (low..high).filter(|along| *along != lower[axis]) {
             let mut other = lower;

@@ -259,7 +259,8 @@ impl AroundCell {
                 ring.push(LoopPoint { position, id, is_leaf: false, is_face_point: true });
             }
         }
-        let shape = if patches.len() == 4 && patches.iter().all(|p| p.vertex.cut.level() == 0) {
+        let is_plain = |patch: &Patch| patch.vertex.cut.is_unit();
+        let shape = if patches.len() == 4 && patches.iter().all(is_plain) {
             let corners = [0, 1, 2, 3].map(|i| patches[i].vertex.position.map(i64::from));
             let crossing = crossing.map(i64::from);
             let quad = Quad { corners, axis: polygon.edge.axis, crossing };

@@ -14,7 +14,7 @@ use crate::contour::mdc::arcs::{Arc, Edge, edges_of};
 use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::Neighbourhood;
-use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, flags_of};
+use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, HAS_REACHES, flags_of};
 use crate::contour::{ContourError, ContourStats, SURFACE};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{Domain, FacePoint, encode};
@@ -76,7 +76,7 @@ fn may_have_points(layers: &Layers, number: usize) -> bool {
     let below = (0..3).filter_map(|axis| layers.find(key.lower(1 << axis)?));
     std::iter::once(number)
         .chain(below)
-        .any(|number| layers.flags(number) & (HAS_CLUSTERS | HAS_FLAGGED) != 0)
+        .any(|number| layers.flags(number) & (HAS_CLUSTERS | HAS_FLAGGED | HAS_REACHES) != 0)
 }
 
 /// The face points that the brick owns, by ascending key.

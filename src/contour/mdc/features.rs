@@ -74,9 +74,6 @@ impl Workspace {
                 planes.note(number, &own, &self.normals, self.crease_cosine);
             }
         }
-        if own.count == 2 && planes.count == 0 {
-            self.look_farther(at, &own, &mut planes);
-        }
         let planes = &planes.numbers[..planes.count];
         if own.count == 1 {
             for (i, &one) in planes.iter().enumerate() {
@@ -90,23 +87,6 @@ impl Workspace {
         let single =
             planes.iter().find_map(|&one| Some((self.meet(at, &own, &[one], solution)?, [one, 0])));
         Ok(single)
-    }
-
-    /// Looks at all edges of the brick that the cells around a cell have.
-    fn look_farther(&self, at: [usize; 3], own: &OwnPlanes, planes: &mut Planes) {
-        let range = |a: usize| at[a].saturating_sub(1)..(at[a] + 3).min(LINES);
-        for z in range(2) {
-            for y in range(1) {
-                for x in range(0) {
-                    for axis in 0..3 {
-                        if self.is_marked(axis, [x, y, z]) && [x, y, z][axis] < at[axis] + 2 {
-                            let number = self.crossing(axis, [x, y, z]).normal;
-                            planes.note(number, own, &self.normals, self.crease_cosine);
-                        }
-                    }
-                }
-            }
-        }
     }
 
     /// Where the own planes and those of `numbers` meet, if that is in the cell.
@@ -144,7 +124,7 @@ impl Workspace {
     /// The number of the normal on the edge that leaves a corner of a cell outward along `axis`;
     /// 0 where none is.
     #[inline]
-    fn outward(
+    pub(super) fn outward(
         &mut self,
         place: Place,
         at: [usize; 3],

@@ -40,6 +40,11 @@ impl Around {
         &self.points[..self.count]
     }
 
+    /// The mean of the crossings.
+    pub(super) fn middle(&self) -> DVec3 {
+        self.points().iter().sum::<DVec3>() / self.count as f64
+    }
+
     /// The one normal of all crossings.
     #[inline]
     fn flat_normal(&self) -> Option<u32> {
@@ -83,12 +88,23 @@ impl Workspace {
             let hits = around.hits(&self.normals);
             begin(&hits[..around.count], &self.qef)
         });
+        if let Some(near) = self.near_feature(place, at, around)? {
+            self.take_in(&near.planes, at, near.position);
+            match near.face {
+                Some(face) => brick.reaches.push(self.reach(at, around, near.position, face)),
+                None => {
+                    brick.positions.push(self.to_lattice(at, near.position));
+                    stats.feature_vertices += 1;
+                    return Ok(());
+                }
+            }
+        }
         match attempt {
             Attempt::Done(solution) => {
                 let mut position = solution.position;
                 if let Some((met, planes)) = self.toward_feature(place, at, around, &solution)? {
                     position = met;
-                    self.take_in(planes, at, met);
+                    self.take_in(&planes, at, met);
                     stats.feature_vertices += 1;
                 }
                 brick.positions.push(self.to_lattice(at, position));

@@ -25,13 +25,13 @@ impl Workspace {
         );
     }
 
-    /// Adds planes that pass the vertex of the last component to its crossings.
-    pub(super) fn take_in(&mut self, numbers: [u32; 2], at: [usize; 3], vertex: DVec3) {
+    /// Adds planes that pass the vertex of the last component to its crossings; number 0 is none.
+    pub(super) fn take_in(&mut self, numbers: &[u32], at: [usize; 3], vertex: DVec3) {
         if self.clustering.is_none() {
             return;
         }
         let point = (vertex + DVec3::from(at.map(|c| c as f64)) + 0.5).as_vec3().to_array();
-        for number in numbers.into_iter().filter(|number| *number != 0) {
+        for &number in numbers.iter().filter(|number| **number != 0) {
             let normal = self.normals[number as usize];
             let offset = self.planes[number as usize - 1].offset / self.cell_units as f64;
             self.leaves.planes.push(CellPlane { normal, offset });

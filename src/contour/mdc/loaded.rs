@@ -7,7 +7,8 @@ use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of
 use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
 
 /// A cell of the cut, packed: number of its first leaf cell (15 bits), level (3 bits at 15), whether
-/// it is flagged (bit 18), whether it has several vertices (bit 19).
+/// it is flagged (bit 18), whether it has several vertices (bit 19), and one more than the face that
+/// its vertex reaches through (3 bits at 20).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct CutCell(u32);
 
@@ -46,10 +47,34 @@ impl CutCell {
         self.0 & Self::MULTI != 0
     }
 
-    /// Whether it is a leaf cell that is not flagged.
+    /// The same cell, whose vertex reaches through `face`.
+    #[inline]
+    pub fn reaching(self, face: u8) -> Self {
+        Self(self.0 | (u32::from(face) + 1) << 20)
+    }
+
+    /// The face that its vertex reaches through into the cell beyond.
+    #[inline]
+    pub fn reaches(self) -> Option<usize> {
+        (self.0 >> 20 & 7).checked_sub(1).map(|face| face as usize)
+    }
+
+    /// Whether its box is that of a leaf cell.
+    #[inline]
+    pub fn is_unit(self) -> bool {
+        self.0 & (7 << 15 | 7 << 20) == 0
+    }
+
+    /// Whether it is a leaf cell that is not flagged, and its vertex is in it.
     #[inline]
     pub fn is_plain(self) -> bool {
-        self.0 & (7 << 15 | Self::FLAGGED) == 0
+        self.0 & (7 << 15 | 7 << 20 | Self::FLAGGED) == 0
+    }
+
+    /// Whether both boxes are cubes of one size.
+    #[inline]
+    pub fn is_as_large_as(self, other: Self) -> bool {
+        self.level() == other.level() && (self.0 | other.0) >> 20 & 7 == 0
     }
 }
 
@@ -88,6 +113,7 @@ struct CutWalk<'r> {
     cluster: usize,
     member: usize,
     flagged: usize,
+    reach: usize,
     /// First vertex of the cell of the cut under way.
     vertex: u32,
     /// End of the cluster under way, in leaf numbers, and how many vertices it has.
@@ -99,7 +125,17 @@ struct CutWalk<'r> {
 impl<'r> CutWalk<'r> {
     fn new(record: &'r ArchivedCellBrick) -> Self {
         let cut = CutCell(0);
-        Self { record, cluster: 0, member: 0, flagged: 0, vertex: 0, end: 0, count: 0, cut }
+        Self {
+            record,
+            cluster: 0,
+            member: 0,
+            flagged: 0,
+            reach: 0,
+            vertex: 0,
+            end: 0,
+            count: 0,
+            cut,
+        }
     }
 
     fn is_flagged(&mut self, first: usize) -> bool {
@@ -108,6 +144,17 @@ impl<'r> CutWalk<'r> {
             self.flagged += 1;
         }
         flagged.get(self.flagged).is_some_and(|f| usize::from(f.to_native()) == first)
+    }
+
+    /// The face that the vertex of a leaf cell reaches through.
+    #[inline]
+    fn reaches(&mut self, number: usize) -> Option<u8> {
+        let reaches = &self.record.reaches;
+        while reaches.get(self.reach).is_some_and(|r| usize::from(r.cell.to_native()) < number) {
+            self.reach += 1;
+        }
+        let reach = reaches.get(self.reach)?;
+        (reach.is_granted && usize::from(reach.cell.to_native()) == number).then_some(reach.face)
     }
 
     /// The cell of the cut that the leaf cell lies in, with its first vertex; the leaf's components
@@ -131,8 +178,12 @@ impl<'r> CutWalk<'r> {
             }
         }
         let flagged = !self.record.flagged.is_empty() && self.is_flagged(number);
+        let mut cut = CutCell::new(number, 0, flagged, components > 1);
+        if let Some(face) = self.reaches(number) {
+            cut = cut.reaching(face);
+        }
         self.vertex += components;
-        (CutCell::new(number, 0, flagged, components > 1), self.vertex - components, false)
+        (cut, self.vertex - components, false)
     }
 
     /// Which vertex of its cluster the next component has.

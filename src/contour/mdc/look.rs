@@ -10,9 +10,9 @@ use std::ops::Range;
 
 use crate::contour::ContourError;
 use crate::contour::mdc::around_cell::AroundCell;
-use crate::contour::mdc::cell::{cell_number, place_of};
-use crate::contour::mdc::layers::Layers;
-use crate::contour::mdc::neighbourhood::{CutBox, Neighbourhood};
+use crate::contour::mdc::cell::cell_number;
+use crate::contour::mdc::loaded::CutCell;
+use crate::contour::mdc::neighbourhood::{CutBox, Neighbourhood, OWN};
 use crate::contour::mdc::{HAS_MULTI, INSET_UNITS, flags_of};
 use crate::geom::triangle_triangle::{Triangle, meets_improperly};
 use crate::octree::{BrickKey, RecordBytes, encode};
@@ -42,14 +42,18 @@ impl Look {
 
 /// What one look does to a brick.
 pub struct Looked {
+    /// Its number.
+    pub number: usize,
     /// The brick.
     pub key: BrickKey,
     /// What the directory will say of it.
     pub flags: u32,
     /// `None` where nothing changes.
     pub bytes: Option<RecordBytes>,
-    /// Clusters to split.
-    pub banned: Vec<u32>,
+    /// Whether a vertex got another box.
+    pub has_grown: bool,
+    /// Clusters to split, with the numbers of their bricks.
+    pub banned: Vec<(usize, u32)>,
 }
 
 /// What a look decides about one cell.
@@ -65,11 +69,11 @@ enum Decision {
 /// Looks at one brick; at its cells only if it `is_wanted`.
 pub fn look_at(
     nb: &mut Neighbourhood,
-    layers: &Layers,
     number: usize,
     look: Look,
     is_wanted: bool,
 ) -> Result<Looked, ContourError> {
+    let layers = *nb.layers();
     let key = layers.key(number);
     let mut banned = Vec::new();
     let mut decisions = Vec::new();
@@ -85,12 +89,10 @@ pub fn look_at(
             let end = rank + cells.partition_point(|cell| cell_number(*cell) < last);
             debug_assert!(first <= cell_number(cell));
             if cut.is_multi() {
-                let low = place_of(first).map(|c| c as i32);
-                let cut_box = CutBox { low, side: 1 << cut.level() };
-                match decide(nb, cut_box, rank..end, look, cut.is_flagged())? {
+                match decide(nb, cut, rank..end, look)? {
                     Decision::Sound => {}
                     Decision::Flagged(vertices) => decisions.push((first as u16, vertices)),
-                    Decision::Split => banned.push(first as u32 | cut.level() << 15),
+                    Decision::Split => banned.push((number, first as u32 | cut.level() << 15)),
                 }
             }
             rank = end;
@@ -98,7 +100,7 @@ pub fn look_at(
     }
     let was_anew = layers.is_anew(number);
     if decisions.is_empty() && !was_anew {
-        return Ok(Looked { key, flags: 0, bytes: None, banned });
+        return Ok(Looked { number, key, flags: 0, bytes: None, has_grown: false, banned });
     }
     let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
     if is_wanted {
@@ -111,27 +113,28 @@ pub fn look_at(
         }
     }
     let flags = flags_of(&brick);
-    Ok(Looked { key, flags, bytes: Some(encode(&brick)), banned })
+    Ok(Looked { number, key, flags, bytes: Some(encode(&brick)), has_grown: false, banned })
 }
 
 /// Decides about the cell `cut`, whose leaf cells have these ranks.
 fn decide(
     nb: &mut Neighbourhood,
-    cut: CutBox,
+    cut: CutCell,
     ranks: Range<usize>,
     look: Look,
-    was_flagged: bool,
 ) -> Result<Decision, ContourError> {
-    let around = AroundCell::gather(nb, cut, ranks)?;
+    let cut_box = CutBox::new(OWN, cut);
+    let around = AroundCell::gather(nb, cut_box, ranks)?;
     if look == Look::Second && !around.is_near_flagged {
         // Nothing has changed where no vertex moved.
         return Ok(Decision::Sound);
     }
-    if cut.side > 1 {
+    if cut.level() > 0 {
         // The middle of a few crossings is no place for a vertex that stands for many.
         let is_clash = around.is_torn || clash(&around, AroundCell::variants);
         return Ok(if is_clash { Decision::Split } else { Decision::Sound });
     }
+    let was_flagged = cut.is_flagged();
     let keeps_flag = was_flagged && look != Look::Second;
     if !keeps_flag && !clash(&around, AroundCell::variants) {
         return Ok(Decision::Sound);
@@ -139,7 +142,7 @@ fn decide(
     match look {
         Look::FirstAgain if was_flagged => return Ok(Decision::Flagged(around.vertices)),
         Look::First | Look::FirstAgain => {
-            return Ok(Decision::Flagged(middles(&around, cut, nb.cell_units())));
+            return Ok(Decision::Flagged(middles(&around, cut_box, nb.cell_units())));
         }
         Look::Second | Look::SecondAgain => {}
     }
@@ -147,7 +150,7 @@ fn decide(
         return Ok(Decision::Flagged(around.vertices));
     }
     let mut moved = around;
-    moved.vertices = middles(&moved, cut, nb.cell_units());
+    moved.vertices = middles(&moved, cut_box, nb.cell_units());
     if clash(&moved, AroundCell::cone) {
         moved.vertices = between_face_points(&moved);
     }
@@ -170,8 +173,7 @@ fn clash(
 /// The vertices in the middle of the crossings around them.
 fn middles(around: &AroundCell, cut: CutBox, cell_units: i32) -> Vec<(u64, [i32; 3])> {
     let inset = INSET_UNITS as i32;
-    let low = cut.low.map(|c| c * cell_units);
-    let side = cut.side * cell_units;
+    let [low, high] = [cut.low, cut.high].map(|end| end.map(|c| c * cell_units));
     let middle = |id: u64| {
         let corners = around.corners.iter().filter(|corner| corner.vertex == id);
         let (mut sum, mut count) = ([0_i64; 3], 0);
@@ -181,7 +183,7 @@ fn middles(around: &AroundCell, cut: CutBox, cell_units: i32) -> Vec<(u64, [i32;
         }
         std::array::from_fn(|a| {
             let mean = (2 * sum[a] + count).div_euclid(2 * count.max(1)) as i32;
-            mean.clamp(low[a] + inset, low[a] + side - inset)
+            mean.clamp(low[a] + inset, high[a] - inset)
         })
     };
     around.vertices.iter().map(|(id, _)| (*id, middle(*id))).collect()

@@ -16,6 +16,7 @@ mod cell;
 mod cluster;
 mod face_points;
 mod features;
+mod grants;
 mod layers;
 mod leaf_vertex;
 mod leaves;
@@ -23,6 +24,7 @@ mod loaded;
 mod look;
 mod neighbourhood;
 mod polygons;
+mod reach;
 mod separate;
 mod shape;
 mod triangulate;
@@ -47,6 +49,8 @@ const HAS_MULTI: u32 = 1 << 31;
 const HAS_CLUSTERS: u32 = 1 << 30;
 /// In the flags of a brick of cells: it has flagged cells.
 const HAS_FLAGGED: u32 = 1 << 29;
+/// In the flags of a brick of cells: vertices may reach beyond their cells.
+const HAS_REACHES: u32 = 1 << 28;
 
 /// What the directory says of a brick of cells.
 fn flags_of(brick: &CellBrick) -> u32 {
@@ -55,6 +59,7 @@ fn flags_of(brick: &CellBrick) -> u32 {
     vertices
         | if multi { HAS_MULTI } else { 0 }
         | if brick.clusters.is_empty() { 0 } else { HAS_CLUSTERS }
+        | if brick.reaches.is_empty() { 0 } else { HAS_REACHES }
         | if brick.flagged.is_empty() { 0 } else { HAS_FLAGGED }
 }
 

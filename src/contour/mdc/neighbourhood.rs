@@ -6,14 +6,16 @@
 //! Fails:      [`ContourError::Contradiction`] where sound bricks have a cell and these do not.
 
 use crate::contour::ContourError;
-use crate::contour::mdc::cell::{cell_mask, cell_number, components_of, edge_in_cell, number_at};
+use crate::contour::mdc::cell::{
+    cell_mask, cell_number, components_of, edge_in_cell, number_at, place_of,
+};
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::loaded::{CutCell, Loaded, Vertex};
 use crate::contour::mdc::table::is_marked;
 use crate::octree::{BrickKey, Domain, SIDE};
 
 /// The own brick among the 27.
-const OWN: usize = 13;
+pub const OWN: usize = 13;
 /// No cell of the brick has this rank: the list has at most 32768.
 const NO_RANK: u16 = u16::MAX;
 /// Crossings lie at multiples of this many units, and as far from the ends of their edges: so the
@@ -43,7 +45,7 @@ impl Patch {
         (self.slot as u64) << 24 | u64::from(self.vertex.number)
     }
 
-    /// The low corner of its cell of the cut, and how many leaf cells a side that has.
+    /// The box of its cell of the cut, with the empty cell that it reaches into.
     #[inline]
     pub fn cut_box(&self) -> CutBox {
         CutBox::new(self.slot, self.vertex.cut)
@@ -55,22 +57,31 @@ impl Patch {
 pub struct CutBox {
     /// Its low corner, in cells.
     pub low: [i32; 3],
-    /// Its side, in cells.
-    pub side: i32,
+    /// Its high corner.
+    pub high: [i32; 3],
 }
 
 impl CutBox {
-    fn new(slot: usize, cut: CutCell) -> Self {
-        let place = crate::contour::mdc::cell::place_of(cut.first());
+    /// The box of a cell of the cut in the brick in slot `slot`.
+    pub fn new(slot: usize, cut: CutCell) -> Self {
+        let place = place_of(cut.first());
         let steps = steps_of(slot);
-        let low = std::array::from_fn(|a| place[a] as i32 + steps[a] * SIDE as i32);
-        Self { low, side: 1 << cut.level() }
+        let mut low: [i32; 3] = std::array::from_fn(|a| place[a] as i32 + steps[a] * SIDE as i32);
+        let mut high = low.map(|c| c + (1 << cut.level()));
+        if let Some(face) = cut.reaches() {
+            if face % 2 == 1 {
+                high[face / 2] += 1;
+            } else {
+                low[face / 2] -= 1;
+            }
+        }
+        Self { low, high }
     }
 
     /// Whether a leaf cell lies in it.
     #[inline]
     pub fn holds(&self, cell: [i32; 3]) -> bool {
-        (0..3).all(|a| (self.low[a]..self.low[a] + self.side).contains(&cell[a]))
+        (0..3).all(|a| (self.low[a]..self.high[a]).contains(&cell[a]))
     }
 }
 
@@ -131,6 +142,11 @@ impl<'f> Neighbourhood<'f> {
         self.bricks[OWN] = Some(own);
         self.numbers[OWN] = number;
         Ok(())
+    }
+
+    /// All bricks.
+    pub fn layers(&self) -> &Layers<'f> {
+        &self.layers
     }
 
     /// The own brick's key.

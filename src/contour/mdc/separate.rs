@@ -16,11 +16,12 @@
 //!             edges, was found by going through all cells; the face points after Ju and Udeshi
 //!             2006.
 
+use crate::contour::mdc::grants::grant;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::look::{Look, Looked, look_at};
 use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
 use crate::contour::mdc::vertices::Workspace;
-use crate::contour::mdc::{HAS_MULTI, face_points, flags_of};
+use crate::contour::mdc::{HAS_MULTI, HAS_REACHES, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, encode};
@@ -48,27 +49,24 @@ pub fn separate(
 ) -> Result<(BrickFile, ContourStats), ContourError> {
     let mut stats = *placed;
     let separation = Separation { signs, cells, domain, options, resources };
+    let mut state = State { anew: None, turn: 0 };
     let everywhere = vec![true; cells.len()];
-    let mut anew = None;
-    let mut turn = 0;
+    separation.settle(&mut state, Vec::new(), &mut everywhere.clone(), &mut stats)?;
     for look in [Look::First, Look::Second] {
         let (mut look, mut wanted) = (look, everywhere.clone());
         loop {
-            let (looked, banned) = separation.look(anew.as_ref(), look, &wanted, turn)?;
-            anew = Some(looked);
-            turn += 1;
-            if banned.is_empty() {
+            let found = separation.look(&mut state, look, &wanted)?;
+            if found.banned.is_empty() {
                 break;
             }
-            stats.split_clusters += banned.iter().map(|(_, cells)| cells.len() as u64).sum::<u64>();
-            anew = Some(separation.split(anew.as_ref(), &banned, turn)?);
-            turn += 1;
-            (look, wanted) = (look.after_splits(), separation.near(&banned));
+            wanted.fill(false);
+            separation.settle(&mut state, found.banned, &mut wanted, &mut stats)?;
+            look = look.after_splits();
         }
     }
-    let surface =
-        face_points::add(&Layers::new(cells, anew.as_ref()), domain, &mut stats, resources)?;
-    drop(anew);
+    let layers = Layers::new(cells, state.anew.as_ref());
+    let surface = face_points::add(&layers, domain, &mut stats, resources)?;
+    drop(state);
     for name in LOOKS {
         resources.scratch.remove(name)?;
         resources.scratch.remove(&directory_name(name))?;
@@ -76,8 +74,32 @@ pub fn separate(
     Ok((surface, stats))
 }
 
-/// Clusters to split, by the number of their brick.
-type Banned = Vec<(usize, Vec<u32>)>;
+/// The bricks that changed so far.
+struct State {
+    anew: Option<BrickFile>,
+    turn: usize,
+}
+
+impl State {
+    /// The name of the next file, which is not that of the one before.
+    fn next_name(&self) -> &'static str {
+        LOOKS[self.turn % 2]
+    }
+
+    fn put(&mut self, anew: BrickFile) {
+        self.anew = Some(anew);
+        self.turn += 1;
+    }
+}
+
+/// What a pass over the bricks found.
+#[derive(Default)]
+struct Found {
+    /// Clusters to split, with the numbers of their bricks.
+    banned: Vec<(usize, u32)>,
+    /// Bricks in which a vertex reaches beyond its cell that did not before.
+    grown: Vec<usize>,
+}
 
 struct Separation<'s> {
     signs: &'s BrickFile,
@@ -88,24 +110,59 @@ struct Separation<'s> {
 }
 
 impl Separation<'_> {
-    /// Looks at all bricks of `wanted` that have cells with several vertices, as they are in
-    /// `before`; what changed so far, and what must be split.
-    fn look(
+    /// Splits clusters and lets vertices reach beyond their cells, until that splits no more. What
+    /// must be looked at because of it becomes `wanted`.
+    fn settle(
         &self,
-        before: Option<&BrickFile>,
-        look: Look,
-        wanted: &[bool],
-        turn: usize,
-    ) -> Result<(BrickFile, Banned), ContourError> {
-        let layers = Layers::new(self.cells, before);
-        let name = LOOKS[turn % 2];
+        state: &mut State,
+        mut banned: Vec<(usize, u32)>,
+        wanted: &mut [bool],
+        stats: &mut ContourStats,
+    ) -> Result<(), ContourError> {
+        loop {
+            banned.sort_unstable();
+            banned.dedup();
+            stats.split_clusters += banned.len() as u64;
+            if !banned.is_empty() {
+                self.split(state, &banned)?;
+                self.add_near(banned.iter().map(|(number, _)| *number), wanted);
+            }
+            let layers = Layers::new(self.cells, state.anew.as_ref());
+            if !(0..layers.bricks()).any(|number| has_reaches(&layers, number)) {
+                return Ok(());
+            }
+            let found = self.pass(state, has_reaches, |nb, number| grant(nb.layers(), number))?;
+            self.add_near(found.grown.into_iter(), wanted);
+            if found.banned.is_empty() {
+                return Ok(());
+            }
+            banned = found.banned;
+        }
+    }
+
+    /// Looks at all bricks of `wanted` that have cells with several vertices.
+    fn look(&self, state: &mut State, look: Look, wanted: &[bool]) -> Result<Found, ContourError> {
+        self.pass(
+            state,
+            |layers, number| wanted[number] && layers.flags(number) & HAS_MULTI != 0,
+            |nb, number| look_at(nb, number, look, wanted[number]),
+        )
+    }
+
+    /// Visits the bricks that are `wanted`, as they are in `state`, and writes what changed so far.
+    fn pass(
+        &self,
+        state: &mut State,
+        is_wanted: impl Fn(&Layers, usize) -> bool,
+        visit: impl Fn(&mut Neighbourhood, usize) -> Result<Looked, ContourError> + Sync,
+    ) -> Result<Found, ContourError> {
+        let layers = Layers::new(self.cells, state.anew.as_ref());
         let resources = self.resources;
+        let name = state.next_name();
         let mut writer = BrickWriter::create(resources.scratch, name, resources.backing)?;
-        let mut banned = Vec::new();
-        let mut numbers = (0..layers.bricks()).filter(|number| {
-            let is_anew = before.is_some_and(|anew| anew.find(layers.key(*number).0).is_some());
-            is_anew || (wanted[*number] && layers.flags(*number) & HAS_MULTI != 0)
-        });
+        let mut found = Found::default();
+        let mut numbers = (0..layers.bricks())
+            .filter(|number| layers.is_anew(*number) || is_wanted(&layers, *number));
         let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
         ordered_by_weight(
             resources.pool,
@@ -119,65 +176,68 @@ impl Separation<'_> {
             || Neighbourhood::new(layers, self.domain),
             |nb, number| {
                 let _brick = resident.hold(1);
-                let looked = look_at(nb, &layers, number, look, wanted[number])?;
-                Ok((number, looked))
+                visit(nb, number)
             },
-            |(number, looked): (usize, Looked)| {
+            |looked: Looked| {
                 if let Some(bytes) = &looked.bytes {
                     writer.append(looked.key.0, looked.flags, bytes)?;
                 }
-                if !looked.banned.is_empty() {
-                    banned.push((number, looked.banned));
+                if looked.has_grown {
+                    found.grown.push(looked.number);
                 }
+                found.banned.extend(looked.banned);
                 Ok(())
             },
         )?;
-        Ok((writer.finish(resources.cached_windows)?, banned))
+        state.put(writer.finish(resources.cached_windows)?);
+        Ok(found)
     }
 
-    /// The bricks of `before`, with those that have clusters to split made again.
-    fn split(
-        &self,
-        before: Option<&BrickFile>,
-        banned: &Banned,
-        turn: usize,
-    ) -> Result<BrickFile, ContourError> {
+    /// Makes the bricks that have clusters to split again, which are sorted.
+    fn split(&self, state: &mut State, banned: &[(usize, u32)]) -> Result<(), ContourError> {
+        let before = state.anew.as_ref();
         let layers = Layers::new(self.cells, before);
         let resources = self.resources;
-        let name = LOOKS[turn % 2];
+        let name = state.next_name();
         let mut writer = BrickWriter::create(resources.scratch, name, resources.backing)?;
         let mut workspace = Workspace::new(self.domain, self.options);
         for number in 0..layers.bricks() {
             let key = layers.key(number);
-            let more = banned.binary_search_by_key(&number, |(number, _)| *number).ok();
-            let Some(more) = more.map(|at| &banned[at].1) else {
+            let start = banned.partition_point(|(other, _)| *other < number);
+            let more = &banned[start..];
+            let more = &more[..more.partition_point(|(other, _)| *other == number)];
+            if more.is_empty() {
                 if let Some((before, known)) = before.and_then(|b| Some((b, b.find(key.0)?))) {
                     let flags = before.directory()[known].flags;
                     writer.append(key.0, flags, &before.view(known)?)?;
                 }
                 continue;
-            };
+            }
             let mut all = layers.read(number, |record| {
                 Ok(record.banned.iter().map(|cell| cell.to_native()).collect::<Vec<u32>>())
             })?;
-            all.extend(more);
+            all.extend(more.iter().map(|(_, cluster)| cluster));
             all.sort_unstable();
             let (brick, _) = workspace.place(self.signs, number, all)?;
             writer.append(key.0, flags_of(&brick), &encode(&brick))?;
         }
-        Ok(writer.finish(resources.cached_windows)?)
+        state.put(writer.finish(resources.cached_windows)?);
+        Ok(())
     }
 
-    /// Whether each brick is one of `banned`, or touches one.
-    fn near(&self, banned: &Banned) -> Vec<bool> {
-        let mut near = vec![false; self.cells.len()];
-        for (number, _) in banned {
-            let key = BrickKey(self.cells.directory()[*number].key);
+    /// Adds these bricks and those that touch them to `wanted`.
+    fn add_near(&self, numbers: impl Iterator<Item = usize>, wanted: &mut [bool]) {
+        for number in numbers {
+            let key = BrickKey(self.cells.directory()[number].key);
             let around = (0..27).filter_map(|slot| brick_around(key, slot));
             for number in around.filter_map(|key| self.cells.find(key.0)) {
-                near[number] = true;
+                wanted[number] = true;
             }
         }
-        near
     }
+}
+
+/// Whether vertices of a brick may reach beyond their cells.
+fn has_reaches(layers: &Layers, number: usize) -> bool {
+    layers.flags(number) & HAS_REACHES != 0
 }

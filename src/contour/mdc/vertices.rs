@@ -203,6 +203,7 @@ impl Workspace {
             stats.refused_by_error += clustering.refusals.by_error;
             stats.refused_by_shape += clustering.refusals.by_shape;
             stats.cluster_error_cells = clustering.refusals.largest_error;
+            brick.drop_covered_reaches();
         }
         stats.crossed_edges += brick.offsets.len() as u64;
         stats.clusters += brick.clusters.len() as u64;
@@ -258,6 +259,12 @@ impl Workspace {
     #[inline]
     pub(super) fn is_marked(&self, axis: usize, at: [usize; 3]) -> bool {
         self.marks.rows(axis)[at[2] * LINES + at[1]] >> at[0] & 1 == 1
+    }
+
+    /// Which corners of the cell at `at` are inside.
+    #[inline]
+    pub(super) fn mask_at(&self, at: [usize; 3]) -> u8 {
+        self.signs.cell_mask(at)
     }
 
     /// The crossing of a marked edge.

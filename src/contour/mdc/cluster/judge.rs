@@ -9,6 +9,7 @@ use crate::contour::mdc::cluster::cut::{Cut, Mark};
 use crate::contour::mdc::cluster::node::Node;
 use crate::contour::mdc::cluster::planes::{largest_distance, place};
 use crate::contour::mdc::cluster::{Cell, ClusterOptions, Clustering};
+use crate::contour::mdc::reach::SHARP_CELLS;
 
 impl Clustering {
     /// Makes the cell a cluster if all its pieces allow it; whether a larger one may still be.
@@ -26,6 +27,7 @@ impl Clustering {
         }
         let is_simple = pieces.iter().all(Node::is_simple)
             && pieces.len() <= usize::from(u8::MAX)
+            && !self.corners.iter().any(|corner| corner.is_cut_by(cell))
             && !self.shares_ambiguous_face(cut, cell);
         if !is_simple {
             self.refusals.by_shape += 1;
@@ -39,7 +41,7 @@ impl Clustering {
             placed.extend(vertex.map(|(vertex, _)| vertex));
             largest = vertex.map_or(largest, |(_, error)| largest.max(error));
             vertex.is_some()
-        });
+        }) && self.keeps_corners(cut, cell, first_node, &placed);
         if fits && !cut.is_banned(cell) {
             self.refusals.largest_error = self.refusals.largest_error.max(largest);
             cut.collapse(cell, mark, &placed, &self.node_of, first_node);
@@ -47,6 +49,22 @@ impl Clustering {
         cut.placed = placed;
         self.refusals.by_error += u64::from(!fits);
         fits
+    }
+
+    /// Whether every corner of the model that the cell holds has its vertex there.
+    fn keeps_corners(
+        &self,
+        cut: &Cut,
+        cell: &Cell,
+        first_node: usize,
+        placed: &[[i32; 3]],
+    ) -> bool {
+        let slack = (SHARP_CELLS * self.options.cell_units as f64) as i32 + 1;
+        self.corners.iter().filter(|corner| corner.is_in(cell)).all(|corner| {
+            let component = cut.leaves.components[usize::from(self.ranks[corner.cell])];
+            let node = self.node_of[component as usize] as usize - first_node;
+            (0..3).all(|a| (placed[node][a] - corner.position[a]).abs() <= slack)
+        })
     }
 
     /// Whether a piece has both segments of an ambiguous face on the cell's boundary.

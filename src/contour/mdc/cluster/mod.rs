@@ -12,6 +12,7 @@
 //! Source:     Schaefer, Ju, Warren 2007 (vertex clustering); the cut of whole cells and the third
 //!             rule are additions of ours.
 
+mod corners;
 mod cut;
 mod judge;
 mod node;
@@ -27,6 +28,7 @@ use glam::DVec3;
 pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
 
 use crate::contour::mdc::cell::{cell_number, components_of, number_at, place_of, segments_on};
+use crate::contour::mdc::cluster::corners::Corner;
 use crate::contour::mdc::cluster::cut::Cut;
 use crate::contour::mdc::cluster::node::Node;
 use crate::contour::mdc::cluster::planes::{Group, add_group};
@@ -84,6 +86,7 @@ pub struct Clustering {
     /// The piece of every component at the level under way, as its number in `nodes`.
     node_of: Vec<u32>,
     joined: Vec<u32>,
+    corners: Vec<Corner>,
     merged: Vec<Node>,
     merged_groups: Vec<Group>,
     /// Refusals so far in the brick.
@@ -95,6 +98,13 @@ struct Cell {
     level: u32,
     number: usize,
     leaves: Range<usize>,
+}
+
+impl Cell {
+    /// Whether a leaf cell with this number is in it.
+    fn holds(&self, leaf: usize) -> bool {
+        leaf >> (3 * self.level) == self.number
+    }
 }
 
 impl Clustering {
@@ -109,6 +119,7 @@ impl Clustering {
             groups: Vec::new(),
             node_of: Vec::new(),
             joined: Vec::new(),
+            corners: Vec::new(),
             merged: Vec::new(),
             merged_groups: Vec::new(),
             refusals: Refusals::default(),
@@ -123,6 +134,8 @@ impl Clustering {
         self.groups.clear();
         self.node_of.clear();
         self.node_of.resize(brick.positions.len(), 0);
+        self.corners.clear();
+        self.corners.extend(brick.reaches.iter().map(Corner::of));
         for (rank, &cell) in brick.cells.iter().enumerate() {
             self.ranks[cell_number(cell)] = rank as u16;
         }

@@ -1,0 +1,190 @@
+//! Decides which vertices reach into an empty cell beside their own.
+//!
+//! In:         bricks of cells with the [`VertexReach`]es that their planes suggest.
+//! Out:        the bricks in which a vertex moved; clusters to split because they cover a cell that
+//!             a vertex of another brick reaches into.
+//! Invariant:  one vertex at most reaches into a cell, and none into a cell with surface or within
+//!             a cluster: so the boxes of the cut stay apart. What was granted stays so until its
+//!             brick is made again.
+//! Units:      places in cells from the own brick's min corner.
+//! Memory:     the numbers of the cells of a brick and of those around that are asked for.
+//! Fails:      [`ContourError`].
+//! Source:     ours.
+
+use std::collections::HashMap;
+
+use crate::contour::ContourError;
+use crate::contour::mdc::cell::{cell_number, number_at, place_of};
+use crate::contour::mdc::flags_of;
+use crate::contour::mdc::layers::Layers;
+use crate::contour::mdc::look::Looked;
+use crate::octree::{ArchivedCellBrick, BrickKey, CellBrick, SIDE, VertexReach, encode};
+
+/// What a brick tells of the cells that others may reach into.
+struct Ground {
+    number: usize,
+    cells: Vec<u16>,
+    clusters: Vec<u32>,
+    reaches: Vec<VertexReach>,
+}
+
+impl Ground {
+    fn new(number: usize, record: &ArchivedCellBrick) -> Self {
+        let cells = record.cells.iter().map(|cell| cell_number(cell.to_native()) as u16);
+        let reaches = record.reaches.iter().map(|reach| VertexReach {
+            cell: reach.cell.to_native(),
+            face: reach.face,
+            is_granted: reach.is_granted,
+            far: reach.far.to_native(),
+            position: reach.position.map(|c| c.to_native()),
+        });
+        Self {
+            number,
+            cells: cells.collect(),
+            clusters: record.clusters.iter().map(|cluster| cluster.to_native()).collect(),
+            reaches: reaches.collect(),
+        }
+    }
+
+    fn has_surface(&self, cell: usize) -> bool {
+        self.cells.binary_search(&(cell as u16)).is_ok()
+    }
+
+    /// The cluster that covers a cell, without the number of its vertices.
+    fn cluster(&self, cell: usize) -> Option<u32> {
+        let after = self.clusters.partition_point(|c| (*c & 0x7fff) as usize <= cell);
+        let cluster = *self.clusters.get(after.checked_sub(1)?)?;
+        let end = (cluster & 0x7fff) + (1 << (3 * (cluster >> 15 & 7)));
+        ((cell as u32) < end).then_some(cluster & 0x3_ffff)
+    }
+
+    /// What the vertex of a cell wants beyond a face.
+    fn reach(&self, cell: usize, face: usize) -> Option<&VertexReach> {
+        let at = self.reaches.binary_search_by_key(&cell, |reach| usize::from(reach.cell)).ok()?;
+        Some(&self.reaches[at]).filter(|reach| usize::from(reach.face) == face)
+    }
+}
+
+/// The own brick and those around it, as far as they were asked for.
+struct Grounds<'l> {
+    layers: &'l Layers<'l>,
+    key: BrickKey,
+    known: HashMap<u64, Option<Ground>>,
+}
+
+impl Grounds<'_> {
+    /// The brick of a cell, and the cell's number there; `None` where no surface is.
+    fn at(&mut self, place: [i32; 3]) -> Result<Option<(&Ground, usize)>, ContourError> {
+        let side = SIDE as i32;
+        let mut position = self.key.position();
+        for (coordinate, c) in position.iter_mut().zip(place) {
+            let Some(moved) = coordinate.checked_add_signed(c.div_euclid(side)) else {
+                return Ok(None);
+            };
+            *coordinate = moved;
+        }
+        let key = BrickKey::new(position);
+        if !self.known.contains_key(&key.0) {
+            let ground = match self.layers.find(key) {
+                Some(number) => {
+                    Some(self.layers.read(number, |record| Ok(Ground::new(number, record)))?)
+                }
+                None => None,
+            };
+            self.known.insert(key.0, ground);
+        }
+        let number = number_at(place.map(|c| c.rem_euclid(side) as usize));
+        Ok(self.known[&key.0].as_ref().map(|ground| (ground, number)))
+    }
+
+    /// Whether another vertex reaches into the cell at `place`, or would rather than `mine`, which
+    /// does so through `face` of its own cell.
+    fn is_taken(
+        &mut self,
+        place: [i32; 3],
+        face: usize,
+        mine: &VertexReach,
+    ) -> Result<bool, ContourError> {
+        for other_face in (0..6).filter(|other| *other != face) {
+            let other = beyond(place, other_face ^ 1);
+            let Some((ground, number)) = self.at(other)? else { continue };
+            if let Some(reach) = ground.reach(number, other_face)
+                && (reach.is_granted || (reach.far, other_face) < (mine.far, face))
+            {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+}
+
+/// Grants what can be granted in brick `number`.
+///
+/// # Errors
+/// [`ContourError`].
+pub fn grant(layers: &Layers, number: usize) -> Result<Looked, ContourError> {
+    let key = layers.key(number);
+    let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
+    let mut grounds = Grounds { layers, key, known: HashMap::new() };
+    let mut banned = Vec::new();
+    let mut granted = Vec::new();
+    for (at, reach) in brick.reaches.iter().enumerate().filter(|(_, reach)| !reach.is_granted) {
+        let face = usize::from(reach.face);
+        let place = beyond(place_of(usize::from(reach.cell)).map(|c| c as i32), face);
+        if let Some((ground, cell)) = grounds.at(place)? {
+            if ground.has_surface(cell) {
+                continue;
+            }
+            if let Some(cluster) = ground.cluster(cell) {
+                banned.push((ground.number, cluster));
+                continue;
+            }
+        }
+        if !grounds.is_taken(place, face, reach)? {
+            granted.push(at);
+        }
+    }
+    for &at in &granted {
+        move_vertex(&mut brick, at);
+    }
+    let bytes = (layers.is_anew(number) || !granted.is_empty()).then(|| encode(&brick));
+    let has_grown = !granted.is_empty();
+    Ok(Looked { number, key, flags: flags_of(&brick), bytes, has_grown, banned })
+}
+
+fn beyond(mut place: [i32; 3], face: usize) -> [i32; 3] {
+    place[face / 2] += if face % 2 == 1 { 1 } else { -1 };
+    place
+}
+
+/// Moves the vertex of reach number `at` to where it wants.
+fn move_vertex(brick: &mut CellBrick, at: usize) {
+    let reach = &mut brick.reaches[at];
+    reach.is_granted = true;
+    let (cell, position) = (usize::from(reach.cell), reach.position);
+    let vertex = vertex_of(brick, cell);
+    brick.positions[vertex] = position;
+}
+
+/// The first vertex of a leaf cell of the cut.
+fn vertex_of(brick: &CellBrick, cell: usize) -> usize {
+    let mut clusters = brick.clusters.iter().peekable();
+    let (mut vertex, mut end) = (0, 0);
+    for &packed in &brick.cells {
+        let number = cell_number(packed);
+        if number >= cell {
+            break;
+        }
+        if number < end {
+            continue;
+        }
+        match clusters.next_if(|cluster| (**cluster & 0x7fff) as usize <= number) {
+            Some(cluster) => {
+                end = (cluster & 0x7fff) as usize + (1 << (3 * (cluster >> 15 & 7)));
+                vertex += (cluster >> 18) as usize;
+            }
+            None => vertex += usize::from(crate::contour::mdc::cell::components_of(packed).count),
+        }
+    }
+    vertex
+}
