@@ -3,7 +3,7 @@
 mod support;
 
 use brickmend::mesh::shapes::{Corners, Random, cuboid, gear, rotation, transform};
-use brickmend::repair::Settings;
+use brickmend::repair::{Reach, Settings};
 use glam::DVec3;
 
 use crate::support::run::{at_depth, repair_soup, unclustered};
@@ -112,4 +112,20 @@ fn clusters_lose_no_sharp_corner_of_a_turned_cube() {
         }
     }
     assert!(sharp * 100 >= all * 98, "{sharp} of {all} corners are sharp");
+}
+
+#[test]
+fn boxes_in_each_others_way_stay_sound_while_vertices_reach() {
+    let mut random = Random::new(23);
+    for (count, decimate) in [(40, 0.0), (80, 0.1), (120, 1.0)] {
+        let mut soup = Vec::new();
+        for _ in 0..count {
+            let size = [0; 3].map(|_| random.within(0.06, 0.2));
+            let (turn, by) = (rotation(&mut random), DVec3::from(random.point()));
+            soup.extend(transform(&cuboid([0.0; 3], size), turn, by));
+        }
+        let settings = Settings { decimate: Reach::Cells(decimate), ..at_depth(6) };
+        let (_, surface) = repair_soup(&soup, &settings).expect("a result");
+        assert!(surface.proof.components > 1);
+    }
 }
