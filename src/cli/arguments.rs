@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use brickmend::contour::Method;
+use brickmend::ingest::SheetRule;
 use brickmend::repair::{Depth, Length, Limits, Reach, Settings};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
@@ -25,6 +26,9 @@ pub struct ResultArguments {
     /// What is inside.
     #[arg(long, value_enum, default_value_t = FillRuleName::Solid)]
     fill_rule: FillRuleName,
+    /// What becomes of sheets without thickness.
+    #[arg(long, value_enum, default_value_t = SheetRuleName::Thicken)]
+    sheets: SheetRuleName,
     /// Angle in degrees below which a crease is noise.
     #[arg(long, value_name = "DEGREES", default_value = "12", value_parser = parse_angle)]
     crease: f64,
@@ -69,6 +73,16 @@ enum FillRuleName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum SheetRuleName {
+    /// Free ones become plates; fins, flat sheets that hang from a surface by an edge, go.
+    Thicken,
+    /// Flat free ones and fins go.
+    Remove,
+    /// All become plates.
+    KeepFins,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MethodName {
     /// Manifold dual contouring: creases and corners stay sharp.
     Mdc,
@@ -104,10 +118,15 @@ impl ResultArguments {
             FillRuleName::Solid => FillRule::Solid,
             FillRuleName::Evenodd => FillRule::Evenodd,
         };
+        let sheets = match self.sheets {
+            SheetRuleName::Thicken => SheetRule::Thicken,
+            SheetRuleName::Remove => SheetRule::Remove,
+            SheetRuleName::KeepFins => SheetRule::KeepFins,
+        };
         let (crease_deg, strict) = (self.crease, self.strict);
         let (decimate, max_triangles) = (self.decimate, self.max_triangles);
         let method = self.method.into();
-        Settings { depth, fill_rule, crease_deg, method, decimate, max_triangles, strict }
+        Settings { depth, fill_rule, sheets, crease_deg, method, decimate, max_triangles, strict }
     }
 }
 

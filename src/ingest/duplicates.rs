@@ -19,6 +19,7 @@ use crate::ingest::examine::Examiner;
 use crate::ingest::facts::{
     Copied, Fact, JOINED, Outbox, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, counts_once,
 };
+use crate::ingest::fins::FinStats;
 use crate::octree::{Domain, DropRecord};
 use crate::store::{
     FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
@@ -40,6 +41,8 @@ pub struct SettleStats {
     pub rim_length: f64,
     /// Triangles without area on the lattice.
     pub degenerate_triangles: u64,
+    /// Sheets that were taken out.
+    pub fins: FinStats,
 }
 
 /// Which copies count.

@@ -27,7 +27,8 @@ pub(crate) struct Examiner<'e> {
     pub(crate) facts: Outbox<'e, Fact>,
 }
 
-fn owner(domain: &Domain, point: Point) -> u64 {
+/// The key of the brick that holds a point.
+pub(crate) fn owner(domain: &Domain, point: Point) -> u64 {
     let brick = domain.brick_units() as u32;
     BrickKey::new(point.map(|c| c / brick)).0
 }

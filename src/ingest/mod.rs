@@ -19,6 +19,7 @@ mod edges;
 mod error;
 mod examine;
 mod facts;
+mod fins;
 mod packed;
 mod rims;
 #[cfg(test)]
@@ -32,6 +33,7 @@ pub use bins::{BIN_ENTRIES, BINS, BinEntry, Bins, fill_bins};
 pub use crowds::LeftOut;
 pub use duplicates::{DROPS, SettleStats, Settled, settle};
 pub use error::IngestError;
+pub use fins::{FinStats, SheetRule, drop_fins};
 pub use rims::Rims;
 pub use soup::{ATTRIBUTES, AttributeRecord, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use sums::{SoupSums, sum_up};

@@ -5,6 +5,7 @@ use std::path::PathBuf;
 use serde::{Deserialize, Serialize};
 
 use crate::contour::Method;
+use crate::ingest::SheetRule;
 use crate::repair::RepairError;
 use crate::repair::length::{Length, Reach};
 use crate::sign::FillRule;
@@ -42,6 +43,8 @@ pub struct Settings {
     pub depth: Depth,
     /// What is inside.
     pub fill_rule: FillRule,
+    /// What becomes of sheets without thickness.
+    pub sheets: SheetRule,
     /// Smaller dihedral angles are noise.
     pub crease_deg: f64,
     /// The contouring method.
@@ -60,6 +63,7 @@ impl Default for Settings {
         Self {
             depth: Depth::DEFAULT,
             fill_rule: FillRule::Solid,
+            sheets: SheetRule::Thicken,
             crease_deg: 12.0,
             method: Method::Mdc,
             decimate: Reach::DEFAULT_DECIMATE,

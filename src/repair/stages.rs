@@ -7,8 +7,8 @@ use crate::contour::{
     write_surface,
 };
 use crate::ingest::{
-    BinEntry, Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, fill_bins,
-    read_soup, settle,
+    BinEntry, Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, drop_fins,
+    fill_bins, read_soup, settle,
 };
 use crate::io::{ReadOptions, check_output};
 use crate::mesh::{SinkFile, SinkStats};
@@ -119,7 +119,7 @@ impl Run<'_> {
         let files = match step {
             Step::Read => self.read(findings, resources)?,
             Step::Bin => self.bin(workspace, findings, resources)?,
-            Step::Settle => settle_copies(workspace, findings, resources)?,
+            Step::Settle => self.settle(workspace, findings, resources)?,
             Step::Scan => scan_bins(workspace, findings, handles, resources)?,
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
             Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
@@ -193,6 +193,22 @@ impl Run<'_> {
             return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
         Ok(bins.files())
+    }
+
+    fn settle(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        let bins = Bins::open(resources, &workspace.files(), findings.left_out)?;
+        let (triangles, area) = (findings.soup().stats.triangles, findings.measure.area);
+        let domain = findings.domain();
+        let settled = settle(&bins, domain, triangles, resources)?;
+        let rule = self.settings.sheets;
+        let settled = drop_fins(&bins, settled, rule, domain, (triangles, area), resources)?;
+        findings.settle = settled.stats;
+        Ok(vec![settled.drops.state().clone()])
     }
 
     fn sign(
@@ -369,18 +385,6 @@ fn hand_on(file: BrickFile, held: &mut Option<BrickFile>) -> Vec<FileState> {
     let state = file.state().cloned();
     *held = Some(file);
     state.into_iter().collect()
-}
-
-fn settle_copies(
-    workspace: &Workspace,
-    findings: &mut Findings,
-    resources: &Resources,
-) -> Result<Vec<FileState>, RepairError> {
-    let bins = Bins::open(resources, &workspace.files(), findings.left_out)?;
-    let triangles = findings.soup().stats.triangles;
-    let settled = settle(&bins, findings.domain(), triangles, resources)?;
-    findings.settle = settled.stats;
-    Ok(vec![settled.drops.state().clone()])
 }
 
 fn scan_bins(

@@ -1,0 +1,263 @@
+//! The sheets of a soup: how large and flat each is, and how it is held; which of them go.
+//!
+//! Memory:  88 bytes a triangle in tables that spill.
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use crate::ingest::edges::length_of;
+use crate::ingest::examine::owner;
+use crate::ingest::fins::edges::BorderUse;
+use crate::ingest::fins::{FinStats, SheetRule};
+use crate::ingest::packed::{snapped, unpack_ends};
+use crate::octree::{Domain, SoupTriangle};
+use crate::store::{Labels, Resources, Sorter, Spool, SpoolWriter, StoreError, Table};
+
+/// Share of the squared area that the squared moments of the normals make up in a flat sheet: all
+/// of it in a plane, half in the walls of a box or a tube.
+const FLAT_SHARE: f64 = 2.0 / 3.0;
+
+/// A sheet with more of the soup's area is a part of its own, however it is held.
+const MOST_AREA_SHARE: f64 = 0.01;
+
+/// Nothing that hangs on an edge of so many triangles is told apart.
+const MOST_USES: usize = 64;
+
+/// Spool of the borders of sheets.
+const BORDERS: &str = "borders.spool";
+
+/// What is known of a sheet, under the number of its first triangle.
+#[derive(Clone, Copy, Default, Pod, Zeroable)]
+#[repr(C)]
+struct Sheet {
+    area: f64,
+    /// Sums of area times products of the unit normal: xx, xy, xz, yy, yz, zz.
+    moments: [f64; 6],
+    /// Length of the border that is open, and of the one by which the sheet is held.
+    open: f64,
+    held: f64,
+    triangles: u32,
+    state: u32,
+}
+
+/// No sheet that could go: it meets an edge of three or more twice.
+const STAYS: u32 = 1;
+/// It goes unless that opens something.
+const MAY_GO: u32 = 2;
+
+impl Sheet {
+    fn is_flat(&self) -> bool {
+        let [xx, xy, xz, yy, yz, zz] = self.moments;
+        let squares = xx * xx + yy * yy + zz * zz + 2.0 * (xy * xy + xz * xz + yz * yz);
+        squares >= FLAT_SHARE * self.area * self.area
+    }
+
+    fn may_go(&self, rule: SheetRule, total_area: f64) -> bool {
+        if self.state & STAYS != 0 || self.open == 0.0 || !self.is_flat() {
+            return false;
+        }
+        if self.held == 0.0 {
+            return rule == SheetRule::Remove;
+        }
+        self.held < self.open && self.area <= MOST_AREA_SHARE * total_area
+    }
+}
+
+/// See the module.
+pub struct Parts {
+    labels: Labels,
+    sheets: Table<Sheet>,
+    unit: f64,
+    /// By edge.
+    borders: Option<Spool<BorderUse>>,
+    scratch: crate::store::Scratch,
+    is_any_held: bool,
+    is_any_open: bool,
+}
+
+impl Parts {
+    /// Sheets whose triangles have these labels.
+    pub fn new(labels: Labels, unit: f64, resources: &Resources) -> Result<Self, StoreError> {
+        let mut sheets = Table::new(resources.scratch, resources.share_bytes / 4);
+        for _ in 0..labels.len() {
+            sheets.push(Sheet::default())?;
+        }
+        let scratch = resources.scratch.clone();
+        Ok(Self {
+            labels,
+            sheets,
+            unit,
+            borders: None,
+            scratch,
+            is_any_held: false,
+            is_any_open: false,
+        })
+    }
+
+    /// Takes in where sheets are open, and where they are held.
+    pub fn take_borders(&mut self, borders: Sorter<BorderUse>) -> Result<(), StoreError> {
+        let mut spool = SpoolWriter::create(&self.scratch, BORDERS)?;
+        let mut sorted = borders.finish()?;
+        while let Some(border) = sorted.next()? {
+            spool.push(border)?;
+        }
+        let spool = spool.finish()?;
+        each_edge(&spool, |uses| self.take_edge(uses))?;
+        self.borders = Some(spool);
+        Ok(())
+    }
+
+    fn take_edge(&mut self, uses: &[BorderUse]) -> Result<(), StoreError> {
+        let length = length_of(unpack_ends(uses[0].ends), self.unit);
+        let sheets = self.sheets_of(uses)?;
+        let is_crowded = uses.len() == MOST_USES;
+        for (i, &label) in sheets.iter().enumerate() {
+            let mut sheet = self.sheets.get(u64::from(label))?;
+            if uses.len() == 1 {
+                sheet.open += length;
+                self.is_any_open = true;
+            } else if is_crowded
+                || sheets.get(i + 1) == Some(&label)
+                || i > 0 && sheets[i - 1] == label
+            {
+                sheet.state |= STAYS;
+            } else {
+                sheet.held += length;
+                self.is_any_held = true;
+            }
+            self.sheets.set(u64::from(label), sheet)?;
+        }
+        Ok(())
+    }
+
+    /// The sheet of every use, sorted.
+    fn sheets_of(&mut self, uses: &[BorderUse]) -> Result<Vec<u32>, StoreError> {
+        let mut labels = Vec::with_capacity(uses.len());
+        for border in uses {
+            labels.push(self.labels.label(border.source)?);
+        }
+        labels.sort_unstable();
+        Ok(labels)
+    }
+
+    /// Whether the borders leave room for a sheet to go.
+    pub fn may_have_fins(&self, rule: SheetRule) -> bool {
+        self.is_any_open && (self.is_any_held || rule == SheetRule::Remove)
+    }
+
+    /// Adds a triangle to its sheet, in the brick that owns its lowest corner.
+    pub fn add_area(
+        &mut self,
+        triangle: &SoupTriangle,
+        domain: &Domain,
+        brick: u64,
+    ) -> Result<(), StoreError> {
+        let lowest = snapped(domain, triangle).into_iter().min().expect("three corners");
+        if owner(domain, lowest) != brick {
+            return Ok(());
+        }
+        let label = u64::from(self.labels.label(triangle.source)?);
+        let mut sheet = self.sheets.get(label)?;
+        if sheet.open == 0.0 {
+            return Ok(());
+        }
+        let [p, q, r] = triangle.corners.map(DVec3::from);
+        let cross = (q - p).cross(r - p);
+        let area = 0.5 * cross.length();
+        if area > 0.0 && area.is_finite() {
+            let n = cross.normalize();
+            let products = [n.x * n.x, n.x * n.y, n.x * n.z, n.y * n.y, n.y * n.z, n.z * n.z];
+            for (sum, product) in sheet.moments.iter_mut().zip(products) {
+                *sum += area * product;
+            }
+            sheet.area += area;
+        }
+        sheet.triangles += 1;
+        self.sheets.set(label, sheet)
+    }
+
+    /// Decides which sheets go; nothing else may open by it.
+    pub fn decide(&mut self, rule: SheetRule, total_area: f64) -> Result<FinStats, StoreError> {
+        for label in 0..self.sheets.len() {
+            let mut sheet = self.sheets.get(label)?;
+            if sheet.may_go(rule, total_area) {
+                sheet.state |= MAY_GO;
+                self.sheets.set(label, sheet)?;
+            }
+        }
+        while self.keep_what_would_open()? {}
+        let mut stats = FinStats::default();
+        for label in 0..self.sheets.len() {
+            let sheet = self.sheets.get(label)?;
+            if sheet.state & MAY_GO != 0 {
+                stats.fins += u64::from(sheet.held > 0.0);
+                stats.free_sheets += u64::from(sheet.held == 0.0);
+                stats.triangles += u64::from(sheet.triangles);
+                stats.area += sheet.area;
+            }
+        }
+        Ok(stats)
+    }
+
+    /// Keeps the sheets on edges that would be left open or empty; whether there were any.
+    fn keep_what_would_open(&mut self) -> Result<bool, StoreError> {
+        let Some(borders) = self.borders.take() else { return Ok(false) };
+        let mut has_kept = false;
+        each_edge(&borders, |uses| {
+            has_kept |= self.keep_on(uses)?;
+            Ok(())
+        })?;
+        self.borders = Some(borders);
+        Ok(has_kept)
+    }
+
+    fn keep_on(&mut self, uses: &[BorderUse]) -> Result<bool, StoreError> {
+        if uses.len() < 3 {
+            return Ok(false);
+        }
+        let mut going = Vec::new();
+        for label in self.sheets_of(uses)? {
+            if self.sheets.get(u64::from(label))?.state & MAY_GO != 0 {
+                going.push(label);
+            }
+        }
+        let left = uses.len() - going.len();
+        if going.is_empty() || left > 0 && left.is_multiple_of(2) {
+            return Ok(false);
+        }
+        for label in going {
+            let mut sheet = self.sheets.get(u64::from(label))?;
+            sheet.state &= !MAY_GO;
+            self.sheets.set(u64::from(label), sheet)?;
+        }
+        Ok(true)
+    }
+
+    /// Whether a triangle's sheet goes.
+    pub fn goes(&mut self, source: u32) -> Result<bool, StoreError> {
+        let label = self.labels.label(source)?;
+        Ok(self.sheets.get(u64::from(label))?.state & MAY_GO != 0)
+    }
+}
+
+/// Visits the uses of edge after edge; of a crowded one [`MOST_USES`] at a time.
+fn each_edge(
+    borders: &Spool<BorderUse>,
+    mut visit: impl FnMut(&[BorderUse]) -> Result<(), StoreError>,
+) -> Result<(), StoreError> {
+    let mut reader = borders.reader(0, borders.len());
+    let mut around: Vec<BorderUse> = Vec::with_capacity(MOST_USES);
+    while let Some(block) = reader.next_block()? {
+        for border in block {
+            if around.first().is_some_and(|first| first.ends != border.ends) {
+                visit(&around)?;
+                around.clear();
+            } else if around.len() == MOST_USES {
+                visit(&around)?;
+                around.remove(0);
+            }
+            around.push(*border);
+        }
+    }
+    if around.is_empty() { Ok(()) } else { visit(&around) }
+}

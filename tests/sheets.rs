@@ -1,0 +1,130 @@
+//! Fins, free sheets and panels that something holds: what goes, and what becomes a plate.
+
+mod support;
+
+use brickmend::ingest::SheetRule;
+use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, shuffle, transform};
+use brickmend::repair::{Limits, Outcome, Settings};
+use glam::{DMat3, DVec3};
+
+use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
+use crate::support::surface::Surface;
+
+/// A rectangle from `at` along two ways.
+fn panel(at: [f64; 3], along: [f64; 3], up: [f64; 3]) -> Vec<Corners> {
+    let (p, u, v) = (DVec3::from(at), DVec3::from(along), DVec3::from(up));
+    let [q, r, s] = [p + u, p + u + v, p + v];
+    vec![[p, q, r].map(Into::into), [p, r, s].map(Into::into)]
+}
+
+/// A box of 2 x 2 x 2 with a fin along each of two of its edges.
+fn finned_box() -> Vec<Corners> {
+    let mut soup = cuboid([-1.0; 3], [1.0; 3]);
+    for (at, along, up) in [
+        ([-1.0, -1.0, 1.0], [2.0, 0.0, 0.0], [0.0, 0.0, 0.05]),
+        ([1.0, 1.0, -1.0], [0.0, 0.0, 2.0], [0.04, 0.04, 0.0]),
+    ] {
+        soup.extend(panel(at, along, up));
+    }
+    soup
+}
+
+fn with_rule(soup: &[Corners], sheets: SheetRule, depth: u32) -> (Outcome, Surface) {
+    repair_soup(soup, &Settings { sheets, ..at_depth(depth) }).expect("a result")
+}
+
+#[test]
+fn a_fin_goes_and_leaves_the_box_as_if_it_had_never_been() {
+    let mut random = Random::new(5);
+    for pose in 0..6 {
+        let scale = [1.0, 1e-6, 1e6][pose % 3];
+        let turn = rotation(&mut random) * DMat3::from_diagonal(DVec3::splat(scale));
+        let by = DVec3::from(random.point()) * scale;
+        let mut soup = transform(&finned_box(), turn, by);
+        // The order and the orientation of triangles tell nothing.
+        shuffle(&mut soup, &mut random);
+        soup.iter_mut().for_each(|corners| {
+            if random.share() < 0.5 {
+                corners.swap(1, 2);
+            }
+        });
+        let (outcome, surface) = with_rule(&soup, SheetRule::Thicken, 6);
+        assert_eq!(outcome.found.settle.fins.fins, 2, "pose {pose}");
+        assert_eq!(outcome.found.settle.fins.triangles, 4);
+        assert_eq!((outcome.invented.sheet_corners, outcome.patch.odd_faces), (0, 0));
+        let volume = 8.0 * scale.powi(3);
+        assert!((surface.proof.volume / volume - 1.0).abs() < 1e-3, "{}", surface.proof.volume);
+        let far = surface.vertices.iter().map(|v| {
+            let local = turn.inverse() * (DVec3::from(*v) - by);
+            local.abs().max_element()
+        });
+        let far = far.fold(0.0, f64::max);
+        assert!(far < 1.01, "pose {pose}: fins of 1.05 were there, and {far} is");
+    }
+}
+
+#[test]
+fn a_fin_that_is_wanted_becomes_a_plate() {
+    let (outcome, surface) = with_rule(&finned_box(), SheetRule::KeepFins, 7);
+    assert_eq!(outcome.found.settle.fins.fins, 0);
+    assert!(outcome.invented.sheet_corners > 0);
+    assert!(surface.proof.volume > 8.0);
+}
+
+#[test]
+fn a_shelf_held_on_three_sides_and_walls_around_an_opening_are_no_fins() {
+    // A box without its front, turned inside out by a second one: a cupboard with thick walls.
+    let (outer, inner) = (cuboid([-1.0; 3], [1.0; 3]), cuboid([-0.8, -1.0, -0.8], [0.8; 3]));
+    let is_front = |corners: &Corners| corners.iter().all(|c| c[1] == -1.0);
+    let mut soup: Vec<Corners> = outer.into_iter().chain(inner).filter(|c| !is_front(c)).collect();
+    let rim = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
+    for i in 0..4 {
+        let at = |[x, z]: [f64; 2], size: f64| [x * size, -1.0, z * size];
+        let (p, q) = (rim[i], rim[(i + 1) % 4]);
+        soup.push([at(p, 1.0), at(q, 1.0), at(q, 0.8)]);
+        soup.push([at(p, 1.0), at(q, 0.8), at(p, 0.8)]);
+    }
+    let closed = with_rule(&soup, SheetRule::Thicken, 6);
+    assert_eq!((closed.0.found.settle.rim_edges, closed.0.found.settle.fins.fins), (0, 0));
+    // A panel on the floor of the cupboard, along three of its edges, would be the floor again:
+    // walls of four panels on the roof, without a lid, hang from it by four edges.
+    for i in 0..4 {
+        let (p, q) = (rim[i], rim[(i + 1) % 4]);
+        soup.extend(panel([p[0], p[1], 1.0], [q[0] - p[0], q[1] - p[1], 0.0], [0.0, 0.0, 0.1]));
+    }
+    let (outcome, _) = with_rule(&soup, SheetRule::Thicken, 6);
+    assert!(outcome.found.settle.rim_edges > 0);
+    assert_eq!(outcome.found.settle.fins.fins, 0, "walls are not flat");
+}
+
+#[test]
+fn a_free_panel_becomes_a_plate_and_goes_only_on_demand() {
+    let mut soup = cuboid([-1.0; 3], [0.0; 3]);
+    soup.extend(panel([0.3, -1.0, -1.0], [0.0, 1.0, 0.1], [0.0, 0.1, 1.0]));
+    let (kept, plates) = with_rule(&soup, SheetRule::Thicken, 6);
+    assert_eq!(kept.found.settle.fins.triangles, 0);
+    assert!(plates.proof.components > 1);
+    let (gone, alone) = with_rule(&soup, SheetRule::Remove, 6);
+    let fins = gone.found.settle.fins;
+    assert_eq!((fins.free_sheets, fins.fins, fins.triangles), (1, 0, 2));
+    assert!((fins.area - 1.0).abs() < 0.02, "{}", fins.area);
+    assert_eq!(alone.proof.components, 1);
+    assert!((alone.proof.volume - 1.0).abs() < 1e-6, "{}", alone.proof.volume);
+}
+
+#[test]
+fn fins_are_found_alike_whatever_the_memory_and_the_threads() {
+    let workshop = Workshop::new();
+    let input = workshop.write(&finned_box(), Encoding::Obj);
+    let limits = [
+        Limits::default(),
+        Limits { share_bytes: Some(16 << 10), ..Limits::default() },
+        Limits { threads: 8, ..Limits::default() },
+    ];
+    let bytes = limits.map(|limits| {
+        let repaired = workshop.repair(&input, "ply", &at_depth(7), &limits).expect("a result");
+        assert_eq!(repaired.outcome.found.settle.fins.fins, 2);
+        std::fs::read(repaired.path).expect("it is there")
+    });
+    assert!(bytes.iter().all(|other| *other == bytes[0]));
+}
