@@ -9,6 +9,8 @@ use std::sync::{Mutex, PoisonError};
 use bytemuck::{Pod, Zeroable};
 
 use crate::store::{Record, Sorter, StoreError};
+use crate::verify::intersect::filters::Normal;
+use crate::verify::intersect::flat_fans::{FlatCorners, FlatFans};
 use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
 use crate::verify::intersect::near::{NearBox, NearPairs, PLACE_BITS};
 use crate::verify::intersect::pair::{Face, Sharing, intersect};
@@ -119,6 +121,9 @@ pub(crate) struct Workbench {
     positions: Vec<Point>,
     tame: Vec<bool>,
     faces: Vec<Face>,
+    normals: Vec<Normal>,
+    flat: FlatFans,
+    flat_corners: Vec<FlatCorners>,
     numbers: Vec<u64>,
     near: NearPairs,
     is_wide: Vec<bool>,
@@ -137,7 +142,23 @@ impl Workbench {
             self.unpack(task, |_, _, position| -> PositionKey { key_of(position) })
         };
         let crosses = task.border.is_some();
-        let Self { positions, faces, numbers, near, is_wide, queues, begun, .. } = self;
+        let Self {
+            positions,
+            faces,
+            normals,
+            flat,
+            flat_corners,
+            numbers,
+            near,
+            is_wide,
+            queues,
+            begun,
+            ..
+        } = self;
+        flat.find(faces, normals, positions);
+        flat_corners.clear();
+        flat_corners
+            .extend((0..).zip(&*faces).map(|(at, face)| FlatCorners::of(at, face, &flat.is_flat)));
         let mut judge = Judge {
             positions,
             faces,
@@ -150,6 +171,9 @@ impl Workbench {
         };
         near.each(&mut |a, b| {
             if crosses && ((a as usize) < border) == ((b as usize) < border) {
+                return;
+            }
+            if flat_corners[a as usize].share(&flat_corners[b as usize]) {
                 return;
             }
             let sharing = Sharing::of(&faces[a as usize], &faces[b as usize]);
@@ -172,10 +196,12 @@ impl Workbench {
         task: &CellTask,
         name_of: impl Fn(&Unpacked<'_>, usize, Point) -> N,
     ) -> usize {
-        let Self { positions, tame, faces, numbers, near, is_wide, places, begun, .. } = self;
+        let Self { positions, tame, faces, normals, numbers, near, is_wide, places, begun, .. } =
+            self;
         positions.clear();
         tame.clear();
         faces.clear();
+        normals.clear();
         numbers.clear();
         near.boxes.clear();
         is_wide.clear();
@@ -223,7 +249,9 @@ impl Workbench {
                 let range = grid.range(low, high);
                 near.boxes.push(NearBox::new(range.low, range.high, starts));
                 let is_tame = vertices.iter().all(|&vertex| tame[vertex as usize]);
-                faces.push(Face::of(vertices, corners, is_tame));
+                let normal = Normal::of(corners);
+                faces.push(Face::of(vertices, &normal, is_tame));
+                normals.push(normal);
                 numbers.push(number);
             }
         }

@@ -16,6 +16,8 @@
 
 mod cell;
 mod exact_pair;
+mod filters;
+mod flat_fans;
 mod grid;
 mod join;
 mod near;

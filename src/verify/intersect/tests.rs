@@ -11,6 +11,7 @@ use crate::mesh::shapes::{Corners, ListedTriangles, Random, sphere};
 use crate::monitor::Void;
 use crate::store::Scratch;
 use crate::verify::intersect::exact_pair::meet;
+use crate::verify::intersect::filters::Normal;
 use crate::verify::intersect::pair::{Face, Sharing, intersect};
 use crate::verify::intersect::signs::{Point, Signs, is_tame};
 use crate::verify::positions::key_of;
@@ -109,7 +110,7 @@ fn brute_force(a: [Whole; 3], b: [Whole; 3], names: [[u32; 3]; 2]) -> bool {
 fn by_filters_and_signs(points: &[Point], a: [u32; 3], b: [u32; 3]) -> bool {
     let face = |vertices: [u32; 3]| {
         let corners = vertices.map(|v| points[v as usize]);
-        Face::of(vertices, corners, corners.iter().all(is_tame))
+        Face::of(vertices, &Normal::of(corners), corners.iter().all(is_tame))
     };
     let (a, b) = (face(a), face(b));
     intersect(Sharing::of(&a, &b), &a, &b, points)
