@@ -9,10 +9,11 @@ use std::sync::{Mutex, PoisonError};
 use bytemuck::{Pod, Zeroable};
 
 use crate::store::{Record, Sorter, StoreError};
+use crate::verify::intersect::boxes::PLACE_BITS;
 use crate::verify::intersect::filters::Normal;
 use crate::verify::intersect::flat_fans::{FlatCorners, FlatFans};
 use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
-use crate::verify::intersect::near::{NearBox, NearPairs, PLACE_BITS};
+use crate::verify::intersect::neighbours::Neighbours;
 use crate::verify::intersect::pair::{Face, Sharing, intersect};
 use crate::verify::intersect::parcels::{Parcel, Unpacked};
 use crate::verify::intersect::signs::{Point, is_tame};
@@ -125,7 +126,7 @@ pub(crate) struct Workbench {
     flat: FlatFans,
     flat_corners: Vec<FlatCorners>,
     numbers: Vec<u64>,
-    near: NearPairs,
+    near: Neighbours,
     is_wide: Vec<bool>,
     places: Vec<u32>,
     begun: u64,
@@ -169,13 +170,11 @@ impl Workbench {
             wide,
             failure: None,
         };
-        near.each(&mut |a, b| {
-            if crosses && ((a as usize) < border) == ((b as usize) < border) {
-                return;
-            }
-            if flat_corners[a as usize].share(&flat_corners[b as usize]) {
-                return;
-            }
+        let leaves_out = |a: u32, b: u32| {
+            flat_corners[a as usize].share(&flat_corners[b as usize])
+                || crosses && ((a as usize) < border) == ((b as usize) < border)
+        };
+        near.each(leaves_out, |a, b| {
             let sharing = Sharing::of(&faces[a as usize], &faces[b as usize]);
             let queue = &mut queues[sharing.count()];
             queue.push((a, b, sharing));
@@ -203,10 +202,10 @@ impl Workbench {
         faces.clear();
         normals.clear();
         numbers.clear();
-        near.boxes.clear();
+        near.clear();
         is_wide.clear();
         *begun = 0;
-        let mut slots = Slots::<N>::new();
+        let mut slots = Slots::<N>::with_room(task.parcels.iter().map(Parcel::vertices).sum());
         let grid = task.cells[0].grid_within(PLACE_BITS);
         let mut words = &task.words[..];
         let mut before_border = usize::MAX;
@@ -247,7 +246,7 @@ impl Workbench {
                 }
                 is_wide.push(wide);
                 let range = grid.range(low, high);
-                near.boxes.push(NearBox::new(range.low, range.high, starts));
+                near.push(range, starts);
                 let is_tame = vertices.iter().all(|&vertex| tame[vertex as usize]);
                 let normal = Normal::of(corners);
                 faces.push(Face::of(vertices, &normal, is_tame));

@@ -22,8 +22,8 @@ pub(crate) fn minus(p: Point, q: Point) -> Point {
 #[derive(Clone, Copy)]
 pub(crate) struct Normal {
     pub(crate) towards: Point,
-    /// Sums of the magnitudes of the products in `towards`.
-    doubt: Point,
+    /// What a sum of its coordinates, each at most once, may be off.
+    doubt: f64,
 }
 
 impl Normal {
@@ -31,9 +31,11 @@ impl Normal {
     pub(crate) fn of([a, b, c]: [Point; 3]) -> Self {
         let (u, v) = (minus(b, a), minus(c, a));
         let product = |i: usize, j: usize| u[i] * v[j];
+        let magnitude = |[i, j]: [usize; 2]| product(i, j).abs() + product(j, i).abs();
         Self {
             towards: PLANES.map(|[i, j]| product(i, j) - product(j, i)),
-            doubt: PLANES.map(|[i, j]| product(i, j).abs() + product(j, i).abs()),
+            doubt: SIDE_BOUND
+                * (magnitude(PLANES[0]) + magnitude(PLANES[1]) + magnitude(PLANES[2])),
         }
     }
 
@@ -44,13 +46,12 @@ impl Normal {
         if n[0] >= n[1] && n[0] >= n[2] { 0 } else { 1 + u8::from(n[2] > n[1]) }
     }
 
-    /// Whether it surely leads the same way as a direction of whole numbers of a few bits.
+    /// Whether it surely leads the same way as a direction, whose coordinates are whole numbers of
+    /// at most this magnitude.
     #[inline]
-    pub(crate) fn leads(&self, direction: Point) -> bool {
-        let product = |v: &Point, i: usize| v[i] * direction[i];
-        let (n, m) = (&self.towards, &self.doubt);
-        let magnitude = product(m, 0).abs() + product(m, 1).abs() + product(m, 2).abs();
-        product(n, 0) + product(n, 1) + product(n, 2) > SIDE_BOUND * magnitude
+    pub(crate) fn leads(&self, direction: Point, most: f64) -> bool {
+        let product = |i: usize| self.towards[i] * direction[i];
+        product(0) + product(1) + product(2) > self.doubt * most
     }
 }
 

@@ -31,7 +31,7 @@ const FEW: usize = 24;
 pub(crate) struct FlatFans {
     /// Where the corners of each vertex end.
     ends: Vec<u32>,
-    /// Corners by vertex: three times the triangle and which of its corners.
+    /// Corners by vertex: four times the triangle and which of its corners.
     corners: Vec<u32>,
     /// Where the angles around a vertex begin and where they end.
     next: Vec<u32>,
@@ -68,7 +68,7 @@ impl FlatFans {
             *end = sum;
         }
         corners.resize(3 * faces.len(), 0);
-        for (face, first) in faces.iter().zip((0..).step_by(3)) {
+        for (face, first) in faces.iter().zip((0..).step_by(4)) {
             for (vertex, corner) in face.vertices.into_iter().zip(first..) {
                 let end = &mut ends[vertex as usize];
                 corners[*end as usize] = corner;
@@ -89,7 +89,7 @@ impl FlatFans {
         let corners = &self.corners[range];
         let mut sum = [0.0; 3];
         for &corner in corners {
-            let towards = normals[corner as usize / 3].towards;
+            let towards = normals[corner as usize / 4].towards;
             sum = [sum[0] + towards[0], sum[1] + towards[1], sum[2] + towards[2]];
         }
         let most = sum[0].abs().max(sum[1].abs()).max(sum[2].abs());
@@ -104,12 +104,13 @@ impl FlatFans {
         self.previous.clear();
         let (mut passed, mut passed_behind) = (0, 0);
         for &corner in corners {
-            let (at, corner) = (corner as usize / 3, corner as usize % 3);
+            let (at, corner) = (corner as usize / 4, corner as usize % 4);
             let face = &faces[at];
-            let [next, previous] = [1, 2].map(|by| face.vertices[(corner + by) % 3]);
+            let [a, b, c] = face.vertices;
+            let (next, previous) = [(b, c), (c, a), (a, b)][corner];
             let [from, to] = [next, previous]
                 .map(|vertex| along(minus(positions[vertex as usize], position), across));
-            if !face.tame || !normals[at].leads(sight) || from * to == 0 {
+            if !face.tame || !normals[at].leads(sight, DIRECTION) || from * to == 0 {
                 return false;
             }
             passed += u32::from(from < to);
@@ -166,9 +167,8 @@ impl FlatCorners {
     /// Whether two triangles have one in common.
     #[inline]
     pub(crate) fn share(&self, other: &Self) -> bool {
-        // Without branches, four at one time.
-        let same = |by: u32| (0..4).map(|i| u32::from(self.0[i] == by)).sum::<u32>();
         let [a, b, c, _] = other.0;
-        same(a) + same(b) + same(c) > 0
+        // Without branches, four at one time.
+        self.0.iter().fold(false, |any, &own| any | (own == a) | (own == b) | (own == c))
     }
 }

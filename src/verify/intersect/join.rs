@@ -14,7 +14,7 @@ use rayon::ThreadPool;
 use crate::monitor::Monitor;
 use crate::store::{Scratch, Sorter, StoreError, ordered};
 use crate::verify::intersect::cell::{Cell, CellTask, Found, WidePairs, Workbench};
-use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
+use crate::verify::intersect::grid::{Grid, cell_of_key, extent_of};
 use crate::verify::intersect::parcels::{Packed, Packer, Parcel};
 use crate::verify::intersect::reach::Reach;
 use crate::verify::spool::Spool;
@@ -235,19 +235,19 @@ impl Group {
             at += 1;
             words.clear();
             packed.read(&parcel, &mut words)?;
-            for arrival in parcel.unpack(packed.named, &words).arrivals() {
-                let bounds = box_of(&arrival.corners);
-                if !self.cells[0].takes(&parcel, bounds[0]) {
-                    continue;
+            parcel.unpack(packed.named, &words).try_each_arrival(|arrival| {
+                let [low, high] = arrival.bounds;
+                if !self.cells[0].takes(&parcel, low) {
+                    return Ok(());
                 }
-                let range = grid.range(bounds[0], bounds[1]);
-                if grid.is_wide(extent_of(&bounds)) {
-                    Reach::new(&arrival.corners)
-                        .try_each(&grid, &range, 0, &mut |cell| packer.add(cell, &arrival))?;
+                let range = grid.range(low, high);
+                if grid.is_wide(extent_of(&arrival.bounds)) {
+                    Reach::new(arrival.corners)
+                        .try_each(&grid, &range, 0, &mut |cell| packer.add(cell, arrival))
                 } else {
-                    range.try_each(|cell| packer.add(cell, &arrival))?;
+                    range.try_each(|cell| packer.add(cell, arrival))
                 }
-            }
+            })?;
         }
         let mut level = Level::new(grid, 0, packer)?;
         level.around = self.cells;

@@ -33,13 +33,22 @@ const TRIANGLE_WORDS: usize = 2;
 
 /// A triangle on its way into cells.
 #[derive(Clone, Copy)]
-pub(crate) struct Arrival {
+pub(crate) struct Arrival<'c> {
     /// Its number in the file.
     pub(crate) number: u64,
     /// The numbers of its vertices, in files that have them.
     pub(crate) names: Option<[u32; 3]>,
     /// Its corners.
-    pub(crate) corners: [Point; 3],
+    pub(crate) corners: &'c [Point; 3],
+    /// The box around it.
+    pub(crate) bounds: [Point; 2],
+}
+
+impl<'c> Arrival<'c> {
+    #[inline]
+    pub(crate) fn new(number: u64, names: Option<[u32; 3]>, corners: &'c [Point; 3]) -> Self {
+        Self { number, names, corners, bounds: box_of(corners) }
+    }
 }
 
 /// Where a parcel lies, and what is in it.
@@ -68,6 +77,11 @@ impl Record for Parcel {
 }
 
 impl Parcel {
+    /// The vertices in its list.
+    pub(crate) fn vertices(&self) -> usize {
+        self.vertices as usize
+    }
+
     /// The words that it takes.
     pub(crate) fn words(&self, named: bool) -> usize {
         self.vertices as usize * (POSITION_WORDS + usize::from(named))
@@ -84,7 +98,7 @@ impl Parcel {
 
 /// A parcel that is being filled.
 struct Open {
-    key: u64,
+    cell: [u32; 3],
     first: u64,
     extents: f64,
     positions: Vec<Point>,
@@ -94,10 +108,10 @@ struct Open {
 }
 
 impl Open {
-    fn new(key: u64) -> Self {
+    fn new(cell: [u32; 3]) -> Self {
         let (positions, names, triangles) = (Vec::new(), Vec::new(), Vec::new());
         let recent = [NOT_RECENT; RECENT];
-        Self { key, first: 0, extents: 0.0, positions, names, triangles, recent }
+        Self { cell, first: 0, extents: 0.0, positions, names, triangles, recent }
     }
 
     /// The place of a vertex in the parcel, where it may come twice.
@@ -166,10 +180,9 @@ impl Packer {
     }
 
     /// Puts a triangle into a cell.
-    pub(crate) fn add(&mut self, cell: [u32; 3], arrival: &Arrival) -> Result<(), StoreError> {
-        let key = key_of_cell(cell);
-        if self.open.get(self.latest).is_none_or(|open| open.key != key) {
-            self.latest = self.find_or_open(key)?;
+    pub(crate) fn add(&mut self, cell: [u32; 3], arrival: &Arrival<'_>) -> Result<(), StoreError> {
+        if self.open.get(self.latest).is_none_or(|open| open.cell != cell) {
+            self.latest = self.find_or_open(cell)?;
         }
         let open = &mut self.open[self.latest];
         let is_far = !open.triangles.is_empty()
@@ -192,7 +205,7 @@ impl Packer {
             places |= open.place(name, position) << (10 * at);
         }
         open.triangles.push([places, (arrival.number - open.first) as u32]);
-        open.extents += extent_of(&box_of(&arrival.corners));
+        open.extents += extent_of(&arrival.bounds);
         let more = (open.positions.len() - before) as u64;
         self.open_bytes += more * VERTEX_BYTES + TRIANGLE_BYTES;
         if self.open_bytes > self.most_open_bytes {
@@ -208,7 +221,8 @@ impl Packer {
         Ok(())
     }
 
-    fn find_or_open(&mut self, key: u64) -> Result<usize, StoreError> {
+    fn find_or_open(&mut self, cell: [u32; 3]) -> Result<usize, StoreError> {
+        let key = key_of_cell(cell);
         if let Some(&at) = self.of_cell.get(&key) {
             return Ok(at);
         }
@@ -216,7 +230,7 @@ impl Packer {
             self.close_all()?;
         }
         self.open_bytes += OPEN_BYTES;
-        self.open.push(Open::new(key));
+        self.open.push(Open::new(cell));
         self.of_cell.insert(key, self.open.len() - 1);
         Ok(self.open.len() - 1)
     }
@@ -235,7 +249,8 @@ impl Packer {
             return Ok(());
         }
         let (vertices, triangles) = (open.positions.len() as u32, open.triangles.len() as u32);
-        let Open { key, first, extents, .. } = *open;
+        let Open { cell, first, extents, .. } = *open;
+        let key = key_of_cell(cell);
         let is_final = self.is_final;
         let start = self.words.len();
         let parcel = Parcel { key, start, first, extents, vertices, triangles, is_final };
@@ -311,14 +326,17 @@ impl<'w> Unpacked<'w> {
         })
     }
 
-    /// Its triangles as they arrived.
-    pub(crate) fn arrivals(&self) -> impl Iterator<Item = Arrival> + use<'w> {
+    /// Shows its triangles as they arrived.
+    pub(crate) fn try_each_arrival(
+        &self,
+        mut visit: impl FnMut(&Arrival<'_>) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
         let positions: Vec<Point> = self.positions().collect();
         let names = self.names;
-        self.triangles().map(move |(number, places)| Arrival {
-            number,
-            names: (!names.is_empty()).then(|| places.map(|place| names[place])),
-            corners: places.map(|place| positions[place]),
+        self.triangles().try_for_each(|(number, places)| {
+            let corners = places.map(|place| positions[place]);
+            let names = (!names.is_empty()).then(|| places.map(|place| names[place]));
+            visit(&Arrival::new(number, names, &corners))
         })
     }
 }
