@@ -76,12 +76,28 @@ pub(crate) fn side(u: Point, v: Point, w: Point) -> i32 {
     sure_sign(volume, SIDE_BOUND * magnitude)
 }
 
+/// A product with a direction, which may be any.
+pub(crate) struct SureProduct {
+    pub(crate) is_positive: bool,
+    /// Whether it is surely that, or surely negative.
+    pub(crate) is_sure: bool,
+}
+
+impl SureProduct {
+    #[inline]
+    pub(crate) fn of(u: Point, direction: Point) -> Self {
+        let terms = [u[0] * direction[0], u[1] * direction[1], u[2] * direction[2]];
+        let magnitude = terms[0].abs() + terms[1].abs() + terms[2].abs();
+        let value = terms[0] + terms[1] + terms[2];
+        Self { is_positive: value > 0.0, is_sure: value.abs() > DOT_BOUND * magnitude }
+    }
+}
+
 /// The sure sign of a product with a direction, which may be any; 0 if in doubt.
 #[inline]
 pub(crate) fn along(u: Point, direction: Point) -> i32 {
-    let terms = [u[0] * direction[0], u[1] * direction[1], u[2] * direction[2]];
-    let magnitude = terms[0].abs() + terms[1].abs() + terms[2].abs();
-    sure_sign(terms[0] + terms[1] + terms[2], DOT_BOUND * magnitude)
+    let SureProduct { is_positive, is_sure } = SureProduct::of(u, direction);
+    i32::from(is_sure) * (2 * i32::from(is_positive) - 1)
 }
 
 #[inline]

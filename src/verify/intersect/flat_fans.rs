@@ -13,7 +13,7 @@
 //! a ray that none of them passes leaves less than a round. What lies side by side in sight does so
 //! in space.
 
-use crate::verify::intersect::filters::{Normal, along, minus};
+use crate::verify::intersect::filters::{Normal, SureProduct, minus};
 use crate::verify::intersect::pair::Face;
 use crate::verify::intersect::signs::Point;
 
@@ -23,6 +23,8 @@ const DIRECTION: f64 = (1 << 20) as f64;
 const ROUND: f64 = 1.5 * (1_u64 << 52) as f64;
 /// The ray leads about here. Edges of models seldom do, which would leave doubts.
 const RAY: Point = [619.0, -347.0, 431.0];
+/// The corner after each, and the one after that.
+const NEXT: [usize; 4] = [1, 2, 0, 1];
 /// Corners that are so few are compared each with each, which is faster than to sort them.
 const FEW: usize = 24;
 
@@ -103,20 +105,21 @@ impl FlatFans {
         self.next.clear();
         self.previous.clear();
         let (mut passed, mut passed_behind) = (0, 0);
+        let mut is_sure = true;
         for &corner in corners {
             let (at, corner) = (corner as usize / 4, corner as usize % 4);
             let face = &faces[at];
-            let [a, b, c] = face.vertices;
-            let (next, previous) = [(b, c), (c, a), (a, b)][corner];
-            let [from, to] = [next, previous]
-                .map(|vertex| along(minus(positions[vertex as usize], position), across));
-            if !face.tame || !normals[at].leads(sight, DIRECTION) || from * to == 0 {
-                return false;
-            }
-            passed += u32::from(from < to);
-            passed_behind += u32::from(from > to);
+            let (next, previous) = (face.vertices[NEXT[corner]], face.vertices[NEXT[corner + 1]]);
+            let from = SureProduct::of(minus(positions[next as usize], position), across);
+            let to = SureProduct::of(minus(positions[previous as usize], position), across);
+            is_sure &= face.tame & normals[at].leads(sight, DIRECTION) & from.is_sure & to.is_sure;
+            passed += u32::from(!from.is_positive & to.is_positive);
+            passed_behind += u32::from(from.is_positive & !to.is_positive);
             self.next.push(next);
             self.previous.push(previous);
+        }
+        if !is_sure {
+            return false;
         }
         match imbalance(&mut self.next, &mut self.previous) {
             0 => passed == 1,
@@ -169,6 +172,7 @@ impl FlatCorners {
     pub(crate) fn share(&self, other: &Self) -> bool {
         let [a, b, c, _] = other.0;
         // Without branches, four at one time.
-        self.0.iter().fold(false, |any, &own| any | (own == a) | (own == b) | (own == c))
+        let same = |x: u32, y: u32| u32::from(x == y);
+        self.0.iter().fold(0, |any, &own| any | same(own, a) | same(own, b) | same(own, c)) > 0
     }
 }

@@ -17,6 +17,8 @@
 mod boxes;
 mod cell;
 mod exact_pair;
+#[cfg(test)]
+mod fan_tests;
 mod filters;
 mod flat_fans;
 mod grid;
@@ -24,6 +26,8 @@ mod join;
 mod near;
 mod neighbours;
 mod pair;
+#[cfg(test)]
+mod pair_tests;
 mod parcels;
 mod reach;
 mod signs;
