@@ -14,8 +14,10 @@
 //! Fails:      only as [`StoreError`].
 //! Source:     Dittrich and Seeger 2000 (the cell that counts a pair), Shewchuk 1997 (signs).
 
+mod arrival;
 mod boxes;
 mod cell;
+mod crowd;
 mod exact_pair;
 #[cfg(test)]
 mod fan_tests;
@@ -23,6 +25,7 @@ mod filters;
 mod flat_fans;
 mod grid;
 mod join;
+mod judge;
 mod near;
 mod neighbours;
 mod pair;
@@ -35,16 +38,17 @@ mod signs;
 mod tests;
 mod wide;
 
-pub(crate) use cell::Found;
+pub(crate) use judge::Found;
 pub(crate) use signs::{Signs, is_tame};
 
 use rayon::ThreadPool;
 
 use crate::monitor::Monitor;
 use crate::store::{Scratch, StoreError};
+use crate::verify::intersect::arrival::Arrival;
 use crate::verify::intersect::grid::{Grid, box_of, extent_of};
 use crate::verify::intersect::join::{Join, Shares};
-use crate::verify::intersect::parcels::{Arrival, Packer};
+use crate::verify::intersect::parcels::Packer;
 use crate::verify::intersect::reach::Reach;
 use crate::verify::intersect::signs::Point;
 

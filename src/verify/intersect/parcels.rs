@@ -12,14 +12,15 @@ use std::collections::HashMap;
 use bytemuck::{Pod, Zeroable};
 
 use crate::store::{Record, Scratch, Sorted, Sorter, StoreError};
-use crate::verify::intersect::grid::{box_of, extent_of, key_of_cell};
+use crate::verify::intersect::arrival::{Arrival, Unpacked};
+use crate::verify::intersect::grid::{extent_of, key_of_cell};
 use crate::verify::intersect::signs::Point;
 use crate::verify::positions::{hash, key_of};
 use crate::verify::slots::mix;
 use crate::verify::spool::Spool;
 
 /// Vertices of a parcel: three of their places fit in 32 bits.
-const MOST_VERTICES: usize = 1024;
+pub(crate) const MOST_VERTICES: usize = 1024;
 /// Slots that remember where the latest vertices of a parcel are.
 const RECENT: usize = 256;
 const NOT_RECENT: u16 = u16::MAX;
@@ -28,28 +29,8 @@ const OPEN_BYTES: u64 = 1024;
 const VERTEX_BYTES: u64 = 56;
 const TRIANGLE_BYTES: u64 = 16;
 /// Words of a position and of a triangle.
-const POSITION_WORDS: usize = 6;
-const TRIANGLE_WORDS: usize = 2;
-
-/// A triangle on its way into cells.
-#[derive(Clone, Copy)]
-pub(crate) struct Arrival<'c> {
-    /// Its number in the file.
-    pub(crate) number: u64,
-    /// The numbers of its vertices, in files that have them.
-    pub(crate) names: Option<[u32; 3]>,
-    /// Its corners.
-    pub(crate) corners: &'c [Point; 3],
-    /// The box around it.
-    pub(crate) bounds: [Point; 2],
-}
-
-impl<'c> Arrival<'c> {
-    #[inline]
-    pub(crate) fn new(number: u64, names: Option<[u32; 3]>, corners: &'c [Point; 3]) -> Self {
-        Self { number, names, corners, bounds: box_of(corners) }
-    }
-}
+pub(crate) const POSITION_WORDS: usize = 6;
+pub(crate) const TRIANGLE_WORDS: usize = 2;
 
 /// Where a parcel lies, and what is in it.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -92,7 +73,7 @@ impl Parcel {
     pub(crate) fn unpack<'w>(&self, named: bool, words: &'w [u32]) -> Unpacked<'w> {
         let (positions, rest) = words.split_at(self.vertices as usize * POSITION_WORDS);
         let (names, triangles) = rest.split_at(self.vertices as usize * usize::from(named));
-        Unpacked { positions, names, triangles, first: self.first }
+        Unpacked::new(positions, names, triangles, self.first)
     }
 }
 
@@ -289,54 +270,5 @@ impl Packed {
             at += block.len() as u64;
         }
         Ok(())
-    }
-}
-
-/// A parcel's content.
-pub(crate) struct Unpacked<'w> {
-    positions: &'w [u32],
-    /// The numbers of its vertices; none in files without.
-    pub(crate) names: &'w [u32],
-    triangles: &'w [u32],
-    first: u64,
-}
-
-impl<'w> Unpacked<'w> {
-    /// The positions of its vertices.
-    pub(crate) fn positions(&self) -> impl Iterator<Item = Point> + use<'w> {
-        self.positions.chunks_exact(POSITION_WORDS).map(|words| {
-            std::array::from_fn(|i| {
-                let (low, high) = (u64::from(words[2 * i]), u64::from(words[2 * i + 1]));
-                // The words of f64 as they lie in memory.
-                if cfg!(target_endian = "little") {
-                    f64::from_bits(low | high << 32)
-                } else {
-                    f64::from_bits(high | low << 32)
-                }
-            })
-        })
-    }
-
-    /// The numbers of its triangles and the places of their corners in the lists of vertices.
-    pub(crate) fn triangles(&self) -> impl Iterator<Item = (u64, [usize; 3])> + use<'w> {
-        let first = self.first;
-        self.triangles.chunks_exact(TRIANGLE_WORDS).map(move |words| {
-            let corners = [0, 10, 20].map(|bit| (words[0] >> bit) as usize % MOST_VERTICES);
-            (first + u64::from(words[1]), corners)
-        })
-    }
-
-    /// Shows its triangles as they arrived.
-    pub(crate) fn try_each_arrival(
-        &self,
-        mut visit: impl FnMut(&Arrival<'_>) -> Result<(), StoreError>,
-    ) -> Result<(), StoreError> {
-        let positions: Vec<Point> = self.positions().collect();
-        let names = self.names;
-        self.triangles().try_for_each(|(number, places)| {
-            let corners = places.map(|place| positions[place]);
-            let names = (!names.is_empty()).then(|| places.map(|place| names[place]));
-            visit(&Arrival::new(number, names, &corners))
-        })
     }
 }
