@@ -47,6 +47,12 @@ impl<N: Name> Slots<N> {
         Self { names: Vec::new(), table: vec![EMPTY; 64], len: 0 }
     }
 
+    /// An empty table that does not grow before so many names are there.
+    pub(crate) fn with_room(names: usize) -> Self {
+        let table = vec![EMPTY; (2 * names + 2).next_power_of_two()];
+        Self { names: Vec::with_capacity(names), table, len: 0 }
+    }
+
     /// Bytes held for this many slots at most.
     pub(crate) const fn bytes_per_slot() -> u64 {
         size_of::<N>() as u64 + 16

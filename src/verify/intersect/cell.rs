@@ -2,19 +2,19 @@
 //!
 //! In:         the parcels of a cell.
 //! Out:        how many pairs of triangles intersect, and the first of them.
-//! Memory:     about 150 bytes a triangle, 400 at most.
+//! Memory:     about 230 bytes a triangle, 500 at most.
 
-use std::sync::{Mutex, PoisonError};
-
-use bytemuck::{Pod, Zeroable};
-
-use crate::store::{Record, Sorter, StoreError};
+use crate::store::StoreError;
+use crate::verify::intersect::arrival::Unpacked;
+use crate::verify::intersect::boxes::PLACE_BITS;
+use crate::verify::intersect::filters::Normal;
+use crate::verify::intersect::flat_fans::{FlatCorners, FlatFans};
 use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
-use crate::verify::intersect::near::{NearBox, NearPairs, PLACE_BITS};
-use crate::verify::intersect::pair::{Face, Sharing, intersect};
-use crate::verify::intersect::parcels::{Parcel, Unpacked};
+use crate::verify::intersect::judge::{Found, Judge, WidePairs};
+use crate::verify::intersect::neighbours::Neighbours;
+use crate::verify::intersect::pair::{Face, Sharing};
+use crate::verify::intersect::parcels::Parcel;
 use crate::verify::intersect::signs::{Point, is_tame};
-use crate::verify::places::Smallest;
 use crate::verify::positions::{PositionKey, key_of};
 use crate::verify::slots::{Name, Slots};
 
@@ -66,52 +66,8 @@ pub(crate) struct CellTask {
     pub(crate) counts: bool,
 }
 
-/// A pair of triangles, by the smaller number first.
-pub(crate) type Pair = [u64; 2];
-
-/// A pair that may be found in several cells, since one of the two is wide, see [`Grid::is_wide`].
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct WidePair {
-    pub(crate) pair: Pair,
-    pub(crate) place: Point,
-}
-
-impl Record for WidePair {
-    type Key = Pair;
-    fn key(&self) -> Pair {
-        self.pair
-    }
-}
-
-/// Pairs that may be found in several cells; they are counted when all are there.
-pub(crate) type WidePairs = Mutex<Sorter<WidePair>>;
-
-/// Pairs that a worker keeps back before it hands them on.
-const MOST_KEPT: usize = 256;
 /// Pairs that wait until they are tested together.
 const MOST_QUEUED: usize = 512;
-
-/// What was found.
-pub(crate) struct Found {
-    pub(crate) pairs: u64,
-    /// The first pairs, and where the overlaps of their boxes have their middles.
-    pub(crate) places: Smallest<Pair, Point>,
-    /// Triangles that begin in the cell.
-    pub(crate) triangles: u64,
-}
-
-impl Found {
-    pub(crate) fn new() -> Self {
-        Self { pairs: 0, places: Smallest::new(), triangles: 0 }
-    }
-
-    pub(crate) fn add(&mut self, other: &Self) {
-        self.pairs += other.pairs;
-        self.triangles += other.triangles;
-        other.places.iter().for_each(|&(pair, place)| self.places.offer(pair, place));
-    }
-}
 
 /// Room for a cell's triangles, used again and again.
 #[derive(Default)]
@@ -119,8 +75,11 @@ pub(crate) struct Workbench {
     positions: Vec<Point>,
     tame: Vec<bool>,
     faces: Vec<Face>,
+    normals: Vec<Normal>,
+    flat: FlatFans,
+    flat_corners: Vec<FlatCorners>,
     numbers: Vec<u64>,
-    near: NearPairs,
+    near: Neighbours,
     is_wide: Vec<bool>,
     places: Vec<u32>,
     begun: u64,
@@ -137,7 +96,23 @@ impl Workbench {
             self.unpack(task, |_, _, position| -> PositionKey { key_of(position) })
         };
         let crosses = task.border.is_some();
-        let Self { positions, faces, numbers, near, is_wide, queues, begun, .. } = self;
+        let Self {
+            positions,
+            faces,
+            normals,
+            flat,
+            flat_corners,
+            numbers,
+            near,
+            is_wide,
+            queues,
+            begun,
+            ..
+        } = self;
+        flat.find(faces, normals, positions);
+        flat_corners.clear();
+        flat_corners
+            .extend((0..).zip(&*faces).map(|(at, face)| FlatCorners::of(at, face, &flat.is_flat)));
         let mut judge = Judge {
             positions,
             faces,
@@ -148,10 +123,11 @@ impl Workbench {
             wide,
             failure: None,
         };
-        near.each(&mut |a, b| {
-            if crosses && ((a as usize) < border) == ((b as usize) < border) {
-                return;
-            }
+        let leaves_out = |a: u32, b: u32| {
+            flat_corners[a as usize].share(&flat_corners[b as usize])
+                || crosses && ((a as usize) < border) == ((b as usize) < border)
+        };
+        near.each(leaves_out, |a, b| {
             let sharing = Sharing::of(&faces[a as usize], &faces[b as usize]);
             let queue = &mut queues[sharing.count()];
             queue.push((a, b, sharing));
@@ -172,15 +148,17 @@ impl Workbench {
         task: &CellTask,
         name_of: impl Fn(&Unpacked<'_>, usize, Point) -> N,
     ) -> usize {
-        let Self { positions, tame, faces, numbers, near, is_wide, places, begun, .. } = self;
+        let Self { positions, tame, faces, normals, numbers, near, is_wide, places, begun, .. } =
+            self;
         positions.clear();
         tame.clear();
         faces.clear();
+        normals.clear();
         numbers.clear();
-        near.boxes.clear();
+        near.clear();
         is_wide.clear();
         *begun = 0;
-        let mut slots = Slots::<N>::new();
+        let mut slots = Slots::<N>::with_room(task.parcels.iter().map(Parcel::vertices).sum());
         let grid = task.cells[0].grid_within(PLACE_BITS);
         let mut words = &task.words[..];
         let mut before_border = usize::MAX;
@@ -221,70 +199,14 @@ impl Workbench {
                 }
                 is_wide.push(wide);
                 let range = grid.range(low, high);
-                near.boxes.push(NearBox::new(range.low, range.high, starts));
+                near.push(range, starts);
                 let is_tame = vertices.iter().all(|&vertex| tame[vertex as usize]);
-                faces.push(Face::of(vertices, corners, is_tame));
+                let normal = Normal::of(corners);
+                faces.push(Face::of(vertices, &normal, is_tame));
+                normals.push(normal);
                 numbers.push(number);
             }
         }
         before_border.min(faces.len())
     }
-}
-
-/// Tests pairs of a cell.
-struct Judge<'b> {
-    positions: &'b [Point],
-    faces: &'b [Face],
-    numbers: &'b [u64],
-    is_wide: &'b [bool],
-    found: Found,
-    kept: Vec<WidePair>,
-    wide: &'b WidePairs,
-    failure: Option<StoreError>,
-}
-
-impl Judge<'_> {
-    /// Tests the pairs of a queue and empties it. They all share the same number of corners, so
-    /// that the tests take the same way.
-    fn judge(&mut self, queue: &mut Vec<(u32, u32, Sharing)>) {
-        for (a, b, sharing) in queue.drain(..) {
-            let [a, b] = [a as usize, b as usize];
-            if intersect(sharing, &self.faces[a], &self.faces[b], self.positions) {
-                self.enter(a, b);
-            }
-        }
-    }
-
-    #[cold]
-    fn enter(&mut self, a: usize, b: usize) {
-        let corner = |vertex: u32| self.positions[vertex as usize];
-        let place = middle_of_overlap([a, b].map(|at| self.faces[at].vertices.map(corner)));
-        let numbers = [self.numbers[a], self.numbers[b]];
-        let pair = [numbers[0].min(numbers[1]), numbers[0].max(numbers[1])];
-        if self.is_wide[a] || self.is_wide[b] {
-            self.kept.push(WidePair { pair, place });
-            if self.kept.len() == MOST_KEPT {
-                self.hand_on();
-            }
-        } else {
-            self.found.pairs += 1;
-            self.found.places.offer(pair, place);
-        }
-    }
-
-    fn hand_on(&mut self) {
-        // The sort does not care in which order they come, nor whether another worker failed.
-        let mut wide = self.wide.lock().unwrap_or_else(PoisonError::into_inner);
-        if let Err(error) = wide.extend(&self.kept) {
-            self.failure.get_or_insert(error);
-        }
-        self.kept.clear();
-    }
-}
-
-/// The middle of the overlap of two boxes, by which a pair is found again.
-#[cold]
-fn middle_of_overlap(corners: [[Point; 3]; 2]) -> Point {
-    let [[a_low, a_high], [b_low, b_high]] = corners.map(|corners| box_of(&corners));
-    std::array::from_fn(|i| a_low[i].max(b_low[i]).midpoint(a_high[i].min(b_high[i])) + 0.0)
 }

@@ -18,7 +18,7 @@ pub(crate) struct Grid {
     /// Subtracted after scaling.
     offset: [f64; 3],
     /// The last cell.
-    most: f64,
+    last: u32,
 }
 
 /// A box of cells, both ends included.
@@ -35,13 +35,14 @@ impl Grid {
         let exponent = ((side * std::f64::consts::SQRT_2).to_bits() >> 52) as i32 - 1023;
         let exponent = exponent.clamp(-1000, 1000);
         let half = f64::from(1_u32 << (ROOT_BITS - 1));
-        Self { scale: power(-exponent), offset: [-half; 3], most: 2.0 * half - 1.0 }
+        Self { scale: power(-exponent), offset: [-half; 3], last: (1 << ROOT_BITS) - 1 }
     }
 
     /// The cell of a coordinate.
     #[inline]
     pub(crate) fn cell(&self, axis: usize, x: f64) -> u32 {
-        (x * self.scale - self.offset[axis]).clamp(0.0, self.most) as u32
+        // The conversion itself stops at zero and at the largest number.
+        ((x * self.scale - self.offset[axis]) as u32).min(self.last)
     }
 
     /// The cells that a box meets.
@@ -78,8 +79,7 @@ impl Grid {
 
     /// Whether a range of cells touches those that hold all that lies beyond the grid.
     pub(crate) fn is_at_border(&self, range: &CellRange) -> bool {
-        let last = self.most as u32;
-        (0..3).any(|axis| range.low[axis] == 0 || range.high[axis] == last)
+        (0..3).any(|axis| range.low[axis] == 0 || range.high[axis] == self.last)
     }
 
     /// A grid of 2^bits cells a side inside of a cell that is `1 << shift` cells of this one wide.
@@ -89,7 +89,7 @@ impl Grid {
         Self {
             scale: self.scale * finer,
             offset: std::array::from_fn(|i| (low[i] + self.offset[i]) * finer),
-            most: power(bits as i32) - 1.0,
+            last: (1 << bits) - 1,
         }
     }
 }
@@ -158,8 +158,11 @@ pub(crate) fn cell_of_key(key: u64) -> [u32; 3] {
 /// Lowest and highest corner.
 #[inline]
 pub(crate) fn box_of([a, b, c]: &[Point; 3]) -> [Point; 2] {
-    let low = |i: usize| a[i].min(b[i]).min(c[i]);
-    let high = |i: usize| a[i].max(b[i]).max(c[i]);
+    // All are numbers, which `f64::min` would look after.
+    let less = |x: f64, y: f64| if x < y { x } else { y };
+    let more = |x: f64, y: f64| if x > y { x } else { y };
+    let low = |i: usize| less(less(a[i], b[i]), c[i]);
+    let high = |i: usize| more(more(a[i], b[i]), c[i]);
     [[low(0), low(1), low(2)], [high(0), high(1), high(2)]]
 }
 

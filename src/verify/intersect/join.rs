@@ -13,15 +13,17 @@ use rayon::ThreadPool;
 
 use crate::monitor::Monitor;
 use crate::store::{Scratch, Sorter, StoreError, ordered};
-use crate::verify::intersect::cell::{Cell, CellTask, Found, WidePairs, Workbench};
-use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
+use crate::verify::intersect::cell::{Cell, CellTask, Workbench};
+use crate::verify::intersect::crowd::{Crowd, append, task_of};
+use crate::verify::intersect::grid::{Grid, cell_of_key, extent_of};
+use crate::verify::intersect::judge::{Found, WidePairs};
 use crate::verify::intersect::parcels::{Packed, Packer, Parcel};
 use crate::verify::intersect::reach::Reach;
 use crate::verify::spool::Spool;
 use crate::verify::tape::stop_if_asked;
 
 /// What a triangle takes at most in a worker, and in the tasks that wait for it.
-const TASK_BYTES: u64 = 400;
+const TASK_BYTES: u64 = 500;
 /// More triangles at one time make no worker faster.
 const MOST_TRIANGLES: u64 = 16 << 10;
 const LEAST_TRIANGLES: u64 = 48;
@@ -123,10 +125,10 @@ struct Level {
 }
 
 /// The parcels of a cell.
-struct Group {
+pub(crate) struct Group {
     /// The cell, and behind it those that it lies in.
-    cells: Vec<Cell>,
-    parcels: Spool<Parcel>,
+    pub(crate) cells: Vec<Cell>,
+    pub(crate) parcels: Spool<Parcel>,
     triangles: u64,
     extents: f64,
 }
@@ -195,7 +197,7 @@ impl<'p> Cells<'p> {
             };
             let bits = group.bits(shares.cell_triangles);
             if bits == 0 || stalls >= MOST_STALLS || depth >= MOST_LEVELS {
-                self.crowd = Some(Crowd { group, first: 0, second: None });
+                self.crowd = Some(Crowd::new(group));
                 continue;
             }
             let share = shares.level_bytes(depth);
@@ -235,19 +237,19 @@ impl Group {
             at += 1;
             words.clear();
             packed.read(&parcel, &mut words)?;
-            for arrival in parcel.unpack(packed.named, &words).arrivals() {
-                let bounds = box_of(&arrival.corners);
-                if !self.cells[0].takes(&parcel, bounds[0]) {
-                    continue;
+            parcel.unpack(packed.named, &words).try_each_arrival(|arrival| {
+                let [low, high] = arrival.bounds;
+                if !self.cells[0].takes(&parcel, low) {
+                    return Ok(());
                 }
-                let range = grid.range(bounds[0], bounds[1]);
-                if grid.is_wide(extent_of(&bounds)) {
-                    Reach::new(&arrival.corners)
-                        .try_each(&grid, &range, 0, &mut |cell| packer.add(cell, &arrival))?;
+                let range = grid.range(low, high);
+                if grid.is_wide(extent_of(&arrival.bounds)) {
+                    Reach::new(arrival.corners)
+                        .try_each(&grid, &range, 0, &mut |cell| packer.add(cell, arrival))
                 } else {
-                    range.try_each(|cell| packer.add(cell, &arrival))?;
+                    range.try_each(|cell| packer.add(cell, arrival))
                 }
-            }
+            })?;
         }
         let mut level = Level::new(grid, 0, packer)?;
         level.around = self.cells;
@@ -255,77 +257,4 @@ impl Group {
         level.stalls = stalls;
         Ok(level)
     }
-}
-
-/// A cell that does not fit in memory and that no division makes smaller.
-struct Crowd {
-    group: Group,
-    /// The first parcel of the first chunk.
-    first: u64,
-    /// The first parcel of the second chunk; before that the first chunk is joined with itself.
-    second: Option<u64>,
-}
-
-impl Crowd {
-    /// The next two chunks, of so many triangles at most.
-    fn next_task(&mut self, packed: &Packed, most: u64) -> Result<Option<CellTask>, StoreError> {
-        let count = self.group.parcels.len();
-        if self.second.is_some_and(|second| second >= count) {
-            self.first = self.chunk_end(self.first, most)?;
-            self.second = None;
-        }
-        if self.first >= count {
-            return Ok(None);
-        }
-        let end = self.chunk_end(self.first, most)?;
-        let mut task = task_of(packed, self.group.cells.clone());
-        append(&mut task, packed, &self.group.parcels, self.first..end)?;
-        match self.second {
-            None => self.second = Some(end),
-            Some(second) => {
-                let second_end = self.chunk_end(second, most)?;
-                task.border = Some(task.parcels.len());
-                task.counts = false;
-                append(&mut task, packed, &self.group.parcels, second..second_end)?;
-                self.second = Some(second_end);
-            }
-        }
-        Ok(Some(task))
-    }
-
-    /// Where a chunk ends; it has one parcel at least.
-    fn chunk_end(&self, first: u64, most: u64) -> Result<u64, StoreError> {
-        let (mut at, mut triangles) = (first, 0);
-        let mut buffer = Vec::new();
-        while let Some(parcel) = self.group.parcels.block(at, 1, &mut buffer)?.first() {
-            triangles += u64::from(parcel.triangles);
-            if triangles > most && at > first {
-                break;
-            }
-            at += 1;
-        }
-        Ok(at)
-    }
-}
-
-fn task_of(packed: &Packed, cells: Vec<Cell>) -> CellTask {
-    let (parcels, words) = (Vec::new(), Vec::new());
-    CellTask { cells, parcels, words, named: packed.named, border: None, counts: true }
-}
-
-/// Appends some parcels to a task.
-fn append(
-    task: &mut CellTask,
-    packed: &Packed,
-    parcels: &Spool<Parcel>,
-    range: std::ops::Range<u64>,
-) -> Result<(), StoreError> {
-    let mut buffer = Vec::new();
-    for at in range {
-        let block = parcels.block(at, 1, &mut buffer)?;
-        let parcel = block.first().copied().expect("ranges of parcels end where the list ends");
-        packed.read(&parcel, &mut task.words)?;
-        task.parcels.push(parcel);
-    }
-    Ok(())
 }

@@ -14,12 +14,23 @@
 //! Fails:      only as [`StoreError`].
 //! Source:     Dittrich and Seeger 2000 (the cell that counts a pair), Shewchuk 1997 (signs).
 
+mod arrival;
+mod boxes;
 mod cell;
+mod crowd;
 mod exact_pair;
+#[cfg(test)]
+mod fan_tests;
+mod filters;
+mod flat_fans;
 mod grid;
 mod join;
+mod judge;
 mod near;
+mod neighbours;
 mod pair;
+#[cfg(test)]
+mod pair_tests;
 mod parcels;
 mod reach;
 mod signs;
@@ -27,16 +38,17 @@ mod signs;
 mod tests;
 mod wide;
 
-pub(crate) use cell::Found;
+pub(crate) use judge::Found;
 pub(crate) use signs::{Signs, is_tame};
 
 use rayon::ThreadPool;
 
 use crate::monitor::Monitor;
 use crate::store::{Scratch, StoreError};
+use crate::verify::intersect::arrival::Arrival;
 use crate::verify::intersect::grid::{Grid, box_of, extent_of};
 use crate::verify::intersect::join::{Join, Shares};
-use crate::verify::intersect::parcels::{Arrival, Packer};
+use crate::verify::intersect::parcels::Packer;
 use crate::verify::intersect::reach::Reach;
 use crate::verify::intersect::signs::Point;
 
@@ -49,8 +61,15 @@ const MOST_ROW: f64 = 40.0;
 pub(crate) struct Intersections<'p> {
     scratch: &'p Scratch,
     shares: Shares,
-    early: Vec<Arrival>,
+    early: Vec<Early>,
     placed: Option<Placed>,
+}
+
+/// One of the first triangles.
+struct Early {
+    number: u64,
+    names: Option<[u32; 3]>,
+    corners: [Point; 3],
 }
 
 /// Triangles by cell.
@@ -80,11 +99,10 @@ impl<'p> Intersections<'p> {
         names: Option<[u32; 3]>,
         corners: &[Point; 3],
     ) -> Result<(), StoreError> {
-        let arrival = Arrival { number, names, corners: *corners };
         if let Some(placed) = &mut self.placed {
-            return placed.add(&arrival);
+            return placed.add(&Arrival::new(number, names, corners));
         }
-        self.early.push(arrival);
+        self.early.push(Early { number, names, corners: *corners });
         if self.early.len() == EARLY {
             self.placed = Some(self.place_early()?);
         }
@@ -95,7 +113,7 @@ impl<'p> Intersections<'p> {
     #[cold]
     fn place_early(&mut self) -> Result<Placed, StoreError> {
         let early = std::mem::take(&mut self.early);
-        let extents = early.iter().map(|arrival| extent_of(&box_of(&arrival.corners)));
+        let extents = early.iter().map(|early| extent_of(&box_of(&early.corners)));
         let mean = extents.sum::<f64>() / early.len().max(1) as f64;
         let row = (self.shares.cell_triangles as f64 / 4.0).sqrt().clamp(4.0, MOST_ROW);
         let wide_bytes = self.shares.early_bytes / 8;
@@ -108,7 +126,9 @@ impl<'p> Intersections<'p> {
             wide_triangles: 0,
             wide_cells: [0.0; 21],
         };
-        early.iter().try_for_each(|arrival| placed.add(arrival))?;
+        for Early { number, names, corners } in &early {
+            placed.add(&Arrival::new(*number, *names, corners))?;
+        }
         Ok(placed)
     }
 
@@ -130,11 +150,10 @@ impl<'p> Intersections<'p> {
 
 impl Placed {
     #[inline]
-    fn add(&mut self, arrival: &Arrival) -> Result<(), StoreError> {
+    fn add(&mut self, arrival: &Arrival<'_>) -> Result<(), StoreError> {
         self.triangles += 1;
-        let bounds = box_of(&arrival.corners);
-        let range = self.grid.range(bounds[0], bounds[1]);
-        if self.grid.is_wide(extent_of(&bounds)) {
+        let range = self.grid.range(arrival.bounds[0], arrival.bounds[1]);
+        if self.grid.is_wide(extent_of(&arrival.bounds)) {
             self.wide_triangles += 1;
             for (shift, cells) in (0..).zip(&mut self.wide_cells) {
                 let range = range.coarser(shift);
@@ -162,13 +181,13 @@ impl Placed {
         while let Some(parcel) = wide.next()? {
             words.clear();
             wide.read(&parcel, &mut words)?;
-            for arrival in parcel.unpack(wide.named, &words).arrivals() {
-                let [low, high] = box_of(&arrival.corners);
+            parcel.unpack(wide.named, &words).try_each_arrival(|arrival| {
+                let [low, high] = arrival.bounds;
                 let range = grid.range(low, high).coarser(shift);
-                Reach::new(&arrival.corners).try_each(&grid, &range, shift, &mut |cell| {
-                    packer.add(cell.map(|c| c << shift), &arrival)
-                })?;
-            }
+                Reach::new(arrival.corners).try_each(&grid, &range, shift, &mut |cell| {
+                    packer.add(cell.map(|c| c << shift), arrival)
+                })
+            })?;
         }
         Ok((grid, shift, packer))
     }

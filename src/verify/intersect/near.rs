@@ -8,53 +8,10 @@
 //! Memory:     lists of numbers: 3 per box and level of division at most. A level has at most 7 of 8
 //!             boxes of the one around it.
 
-/// Bits of a coordinate.
-pub(crate) const PLACE_BITS: u32 = 20;
-/// Above each of the three coordinates of a packed corner there is a bit to spare.
-const FIELD_BITS: u32 = PLACE_BITS + 1;
-const SPARE: u64 =
-    1 << PLACE_BITS | 1 << (PLACE_BITS + FIELD_BITS) | 1 << (PLACE_BITS + 2 * FIELD_BITS);
-const PLACE: u64 = (1 << PLACE_BITS) - 1;
+use crate::verify::intersect::boxes::{NearBox, PLACE, SPARE, not_below, pack, unpack};
 
 /// So few boxes are compared each with each.
 const FEW: usize = 40;
-
-/// Three coordinates in one word.
-#[inline]
-pub(crate) fn pack(corner: [u32; 3]) -> u64 {
-    u64::from(corner[0])
-        | u64::from(corner[1]) << FIELD_BITS
-        | u64::from(corner[2]) << (2 * FIELD_BITS)
-}
-
-#[inline]
-fn unpack(word: u64, axis: usize) -> u32 {
-    (word >> (axis as u32 * FIELD_BITS) & PLACE) as u32
-}
-
-/// A mark for each axis along which `high` is not below `low`.
-#[inline]
-fn not_below(high: u64, low: u64) -> u64 {
-    ((high | SPARE) - low) & SPARE
-}
-
-/// A box.
-#[derive(Clone, Copy)]
-pub(crate) struct NearBox {
-    low: u64,
-    high: u64,
-    /// Marks of the axes along which it starts in the cell and not before.
-    starts: u64,
-}
-
-impl NearBox {
-    /// A box, and along which axes it starts in the cell.
-    #[inline]
-    pub(crate) fn new(low: [u32; 3], high: [u32; 3], starts: [bool; 3]) -> Self {
-        let starts = pack(starts.map(u32::from)) << PLACE_BITS;
-        Self { low: pack(low), high: pack(high), starts }
-    }
-}
 
 /// Shows the numbers of the parts that a box meets.
 #[inline]

@@ -4,17 +4,10 @@
 //! In:         two triangles with areas, by the numbers and places of their vertices.
 //! Invariant:  exact. A filter only ever says that they do not meet: it names a plane or a line
 //!             through what they share that separates them beyond all doubt of rounding.
-//! Source:     Shewchuk 1997 for the bounds of the filters.
 
 use crate::verify::intersect::exact_pair::meet;
-use crate::verify::intersect::signs::{PLANES, Point, Signs};
-
-/// Error of a 2 x 2 determinant of differences, per magnitude of its products.
-const TURN_BOUND: f64 = 3.4e-16;
-/// Of a 3 x 3 determinant of differences.
-const SIDE_BOUND: f64 = 7.8e-16;
-/// Of a product of a difference with any direction.
-const DOT_BOUND: f64 = 1.0e-15;
+use crate::verify::intersect::filters::{Normal, along, minus, side, turn};
+use crate::verify::intersect::signs::{Point, Signs};
 
 /// A triangle as the tests see it.
 #[derive(Clone, Copy)]
@@ -28,10 +21,8 @@ pub(crate) struct Face {
 }
 
 impl Face {
-    pub(crate) fn of(vertices: [u32; 3], corners: [Point; 3], tame: bool) -> Self {
-        let n = cross(minus(corners[1], corners[0]), minus(corners[2], corners[0])).map(f64::abs);
-        let axis = if n[0] >= n[1] && n[0] >= n[2] { 0 } else { 1 + u8::from(n[2] > n[1]) };
-        Self { vertices, axis, tame }
+    pub(crate) fn of(vertices: [u32; 3], normal: &Normal, tame: bool) -> Self {
+        Self { vertices, axis: normal.axis(), tame }
     }
 }
 
@@ -119,50 +110,6 @@ pub(crate) fn intersect(sharing: Sharing, a: &Face, b: &Face, positions: &[Point
         }
     }
     meet(signs, p, q, shared)
-}
-
-#[inline]
-fn minus(p: Point, q: Point) -> Point {
-    [p[0] - q[0], p[1] - q[1], p[2] - q[2]]
-}
-
-#[inline]
-fn cross(u: Point, v: Point) -> Point {
-    [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]]
-}
-
-/// The sure sign of the turn from `u` to `v` seen along an axis; 0 if in doubt.
-#[inline]
-fn turn(axis: usize, u: Point, v: Point) -> i32 {
-    let [i, j] = PLANES[axis];
-    let (left, right) = (u[i] * v[j], u[j] * v[i]);
-    sure_sign(left - right, TURN_BOUND * (left.abs() + right.abs()))
-}
-
-/// The sure sign of the determinant of three differences; 0 if in doubt.
-#[inline]
-fn side(u: Point, v: Point, w: Point) -> i32 {
-    let mut volume = 0.0;
-    let mut magnitude = 0.0;
-    for (axis, [i, j]) in PLANES.into_iter().enumerate() {
-        let (left, right) = (u[i] * v[j], u[j] * v[i]);
-        volume += w[axis] * (left - right);
-        magnitude += w[axis].abs() * (left.abs() + right.abs());
-    }
-    sure_sign(volume, SIDE_BOUND * magnitude)
-}
-
-/// The sure sign of a product with a direction, which may be any; 0 if in doubt.
-#[inline]
-fn along(u: Point, direction: Point) -> i32 {
-    let terms = [u[0] * direction[0], u[1] * direction[1], u[2] * direction[2]];
-    let magnitude = terms[0].abs() + terms[1].abs() + terms[2].abs();
-    sure_sign(terms[0] + terms[1] + terms[2], DOT_BOUND * magnitude)
-}
-
-#[inline]
-fn sure_sign(value: f64, bound: f64) -> i32 {
-    i32::from(value > bound) - i32::from(value < -bound)
 }
 
 /// With a common edge: seen from somewhere they lie on both sides of it, or they fold there.

@@ -12,14 +12,15 @@ use std::collections::HashMap;
 use bytemuck::{Pod, Zeroable};
 
 use crate::store::{Record, Scratch, Sorted, Sorter, StoreError};
-use crate::verify::intersect::grid::{box_of, extent_of, key_of_cell};
+use crate::verify::intersect::arrival::{Arrival, Unpacked};
+use crate::verify::intersect::grid::{extent_of, key_of_cell};
 use crate::verify::intersect::signs::Point;
 use crate::verify::positions::{hash, key_of};
 use crate::verify::slots::mix;
 use crate::verify::spool::Spool;
 
 /// Vertices of a parcel: three of their places fit in 32 bits.
-const MOST_VERTICES: usize = 1024;
+pub(crate) const MOST_VERTICES: usize = 1024;
 /// Slots that remember where the latest vertices of a parcel are.
 const RECENT: usize = 256;
 const NOT_RECENT: u16 = u16::MAX;
@@ -28,19 +29,8 @@ const OPEN_BYTES: u64 = 1024;
 const VERTEX_BYTES: u64 = 56;
 const TRIANGLE_BYTES: u64 = 16;
 /// Words of a position and of a triangle.
-const POSITION_WORDS: usize = 6;
-const TRIANGLE_WORDS: usize = 2;
-
-/// A triangle on its way into cells.
-#[derive(Clone, Copy)]
-pub(crate) struct Arrival {
-    /// Its number in the file.
-    pub(crate) number: u64,
-    /// The numbers of its vertices, in files that have them.
-    pub(crate) names: Option<[u32; 3]>,
-    /// Its corners.
-    pub(crate) corners: [Point; 3],
-}
+pub(crate) const POSITION_WORDS: usize = 6;
+pub(crate) const TRIANGLE_WORDS: usize = 2;
 
 /// Where a parcel lies, and what is in it.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
@@ -68,6 +58,11 @@ impl Record for Parcel {
 }
 
 impl Parcel {
+    /// The vertices in its list.
+    pub(crate) fn vertices(&self) -> usize {
+        self.vertices as usize
+    }
+
     /// The words that it takes.
     pub(crate) fn words(&self, named: bool) -> usize {
         self.vertices as usize * (POSITION_WORDS + usize::from(named))
@@ -78,13 +73,13 @@ impl Parcel {
     pub(crate) fn unpack<'w>(&self, named: bool, words: &'w [u32]) -> Unpacked<'w> {
         let (positions, rest) = words.split_at(self.vertices as usize * POSITION_WORDS);
         let (names, triangles) = rest.split_at(self.vertices as usize * usize::from(named));
-        Unpacked { positions, names, triangles, first: self.first }
+        Unpacked::new(positions, names, triangles, self.first)
     }
 }
 
 /// A parcel that is being filled.
 struct Open {
-    key: u64,
+    cell: [u32; 3],
     first: u64,
     extents: f64,
     positions: Vec<Point>,
@@ -94,10 +89,10 @@ struct Open {
 }
 
 impl Open {
-    fn new(key: u64) -> Self {
+    fn new(cell: [u32; 3]) -> Self {
         let (positions, names, triangles) = (Vec::new(), Vec::new(), Vec::new());
         let recent = [NOT_RECENT; RECENT];
-        Self { key, first: 0, extents: 0.0, positions, names, triangles, recent }
+        Self { cell, first: 0, extents: 0.0, positions, names, triangles, recent }
     }
 
     /// The place of a vertex in the parcel, where it may come twice.
@@ -166,10 +161,9 @@ impl Packer {
     }
 
     /// Puts a triangle into a cell.
-    pub(crate) fn add(&mut self, cell: [u32; 3], arrival: &Arrival) -> Result<(), StoreError> {
-        let key = key_of_cell(cell);
-        if self.open.get(self.latest).is_none_or(|open| open.key != key) {
-            self.latest = self.find_or_open(key)?;
+    pub(crate) fn add(&mut self, cell: [u32; 3], arrival: &Arrival<'_>) -> Result<(), StoreError> {
+        if self.open.get(self.latest).is_none_or(|open| open.cell != cell) {
+            self.latest = self.find_or_open(cell)?;
         }
         let open = &mut self.open[self.latest];
         let is_far = !open.triangles.is_empty()
@@ -192,7 +186,7 @@ impl Packer {
             places |= open.place(name, position) << (10 * at);
         }
         open.triangles.push([places, (arrival.number - open.first) as u32]);
-        open.extents += extent_of(&box_of(&arrival.corners));
+        open.extents += extent_of(&arrival.bounds);
         let more = (open.positions.len() - before) as u64;
         self.open_bytes += more * VERTEX_BYTES + TRIANGLE_BYTES;
         if self.open_bytes > self.most_open_bytes {
@@ -208,7 +202,8 @@ impl Packer {
         Ok(())
     }
 
-    fn find_or_open(&mut self, key: u64) -> Result<usize, StoreError> {
+    fn find_or_open(&mut self, cell: [u32; 3]) -> Result<usize, StoreError> {
+        let key = key_of_cell(cell);
         if let Some(&at) = self.of_cell.get(&key) {
             return Ok(at);
         }
@@ -216,7 +211,7 @@ impl Packer {
             self.close_all()?;
         }
         self.open_bytes += OPEN_BYTES;
-        self.open.push(Open::new(key));
+        self.open.push(Open::new(cell));
         self.of_cell.insert(key, self.open.len() - 1);
         Ok(self.open.len() - 1)
     }
@@ -235,7 +230,8 @@ impl Packer {
             return Ok(());
         }
         let (vertices, triangles) = (open.positions.len() as u32, open.triangles.len() as u32);
-        let Open { key, first, extents, .. } = *open;
+        let Open { cell, first, extents, .. } = *open;
+        let key = key_of_cell(cell);
         let is_final = self.is_final;
         let start = self.words.len();
         let parcel = Parcel { key, start, first, extents, vertices, triangles, is_final };
@@ -274,51 +270,5 @@ impl Packed {
             at += block.len() as u64;
         }
         Ok(())
-    }
-}
-
-/// A parcel's content.
-pub(crate) struct Unpacked<'w> {
-    positions: &'w [u32],
-    /// The numbers of its vertices; none in files without.
-    pub(crate) names: &'w [u32],
-    triangles: &'w [u32],
-    first: u64,
-}
-
-impl<'w> Unpacked<'w> {
-    /// The positions of its vertices.
-    pub(crate) fn positions(&self) -> impl Iterator<Item = Point> + use<'w> {
-        self.positions.chunks_exact(POSITION_WORDS).map(|words| {
-            std::array::from_fn(|i| {
-                let (low, high) = (u64::from(words[2 * i]), u64::from(words[2 * i + 1]));
-                // The words of f64 as they lie in memory.
-                if cfg!(target_endian = "little") {
-                    f64::from_bits(low | high << 32)
-                } else {
-                    f64::from_bits(high | low << 32)
-                }
-            })
-        })
-    }
-
-    /// The numbers of its triangles and the places of their corners in the lists of vertices.
-    pub(crate) fn triangles(&self) -> impl Iterator<Item = (u64, [usize; 3])> + use<'w> {
-        let first = self.first;
-        self.triangles.chunks_exact(TRIANGLE_WORDS).map(move |words| {
-            let corners = [0, 10, 20].map(|bit| (words[0] >> bit) as usize % MOST_VERTICES);
-            (first + u64::from(words[1]), corners)
-        })
-    }
-
-    /// Its triangles as they arrived.
-    pub(crate) fn arrivals(&self) -> impl Iterator<Item = Arrival> + use<'w> {
-        let positions: Vec<Point> = self.positions().collect();
-        let names = self.names;
-        self.triangles().map(move |(number, places)| Arrival {
-            number,
-            names: (!names.is_empty()).then(|| places.map(|place| names[place])),
-            corners: places.map(|place| positions[place]),
-        })
     }
 }
