@@ -19,7 +19,9 @@ pub use brick::{
     MAX_HITS, NO_PLANE, PATCH, RecordBytes, SignBrick, SourcePlane, decode_hits, decode_signs,
     encode,
 };
-pub use cell_brick::{ArchivedCellBrick, CellBrick, FacePoint, MAX_LEVEL, decode_cells};
+pub use cell_brick::{
+    Above, ArchivedCellBrick, CellBrick, FacePoint, Facet, MAX_LEVEL, Summary, decode_cells,
+};
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{
     AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,

@@ -20,6 +20,9 @@ const NO_RANK: u16 = u16::MAX;
 /// middles of middles of two of them are on the lattice.
 pub const CROSSING_UNITS: i32 = 4;
 
+/// Names of vertices of cells above the brick, beside those of others.
+const ABOVE: u64 = 1 << 42;
+
 /// A leaf cell that was found: the brick among the 27, and its rank there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Found {
@@ -40,7 +43,16 @@ impl Patch {
     /// A name for the vertex, distinct in this neighbourhood.
     #[inline]
     pub fn id(&self) -> u64 {
+        if self.vertex.cut.is_above() {
+            return ABOVE | u64::from(self.vertex.number);
+        }
         (self.slot as u64) << 24 | u64::from(self.vertex.number)
+    }
+
+    /// Its number among the vertices of the brick in its slot.
+    #[inline]
+    pub fn number_in_brick(&self) -> u32 {
+        if self.vertex.cut.is_above() { 0 } else { self.vertex.number }
     }
 
     /// The low corner of its cell of the cut, and how many leaf cells a side that has.
@@ -63,7 +75,8 @@ impl CutBox {
     fn new(slot: usize, cut: CutCell) -> Self {
         let place = crate::contour::mdc::cell::place_of(cut.first());
         let steps = steps_of(slot);
-        let low = std::array::from_fn(|a| place[a] as i32 + steps[a] * SIDE as i32);
+        let brick = cut.brick_in_it();
+        let low = std::array::from_fn(|a| place[a] as i32 + (steps[a] - brick[a]) * SIDE as i32);
         Self { low, side: 1 << cut.level() }
     }
 
@@ -131,11 +144,6 @@ impl<'f> Neighbourhood<'f> {
         self.bricks[OWN] = Some(own);
         self.numbers[OWN] = number;
         Ok(())
-    }
-
-    /// The own brick's key.
-    pub fn key(&self) -> BrickKey {
-        self.key
     }
 
     /// Lattice units of a cell.
@@ -272,6 +280,30 @@ impl<'f> Neighbourhood<'f> {
         let step = ((i64::from(offset) * steps + (1 << 15)) >> 16).clamp(1, steps - 1);
         crossing[axis] += step as i32 * CROSSING_UNITS;
         crossing
+    }
+
+    /// The vertex on the face between two cells above the brick, if there is one, `key` of it in
+    /// brick `owner`: its number there, and its place from here.
+    ///
+    /// # Errors
+    /// [`ContourError`].
+    pub fn far_point(
+        &self,
+        owner: usize,
+        key: u64,
+    ) -> Result<Option<(u32, [i32; 3])>, ContourError> {
+        let (here, there) = (self.key.position(), self.layers.key(owner).position());
+        let units = self.domain.brick_units() as i32;
+        self.layers.read(owner, |record| {
+            let found = record.points.binary_search_by_key(&key, |point| point.key.to_native());
+            Ok(found.ok().map(|at| {
+                let position = record.points[at].position.map(|c| c.to_native());
+                let place = std::array::from_fn(|a| {
+                    position[a] + (there[a] as i32 - here[a] as i32) * units
+                });
+                ((record.positions.len() + at) as u32, place)
+            }))
+        })
     }
 
     /// A place in model units.

@@ -1,8 +1,9 @@
 //! Keeps surfaces apart that pass through one cell: which cells are flagged, and which split.
 //!
 //! In:         bricks of cells, and the signs that they were made from.
-//! Out:        the bricks that changed, anew: flagged cells with their vertices, clusters that were
-//!             split, and all face points that are vertices.
+//! Out:        the bricks that changed, anew: those of clusters above the brick ([`above`]),
+//!             flagged cells with their vertices, clusters that were split, and all face points
+//!             that are vertices.
 //! Invariant:  no two triangles of the surface that is drawn from these bricks meet anywhere but
 //!             in shared vertices and edges. A cell with one vertex cannot meet itself: its piece
 //!             is a cone over a simple curve. One with several is flagged if triangles that it may
@@ -20,7 +21,7 @@ use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::look::{Look, Looked, look_at};
 use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
 use crate::contour::mdc::vertices::Workspace;
-use crate::contour::mdc::{HAS_MULTI, face_points, flags_of};
+use crate::contour::mdc::{HAS_MULTI, above, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, encode};
@@ -49,7 +50,8 @@ pub fn separate(
     let mut stats = *placed;
     let separation = Separation { signs, cells, domain, options, resources };
     let everywhere = vec![true; cells.len()];
-    let mut anew = None;
+    // The first look reads the file that the second one will write.
+    let mut anew = above::cluster(cells, domain, options, LOOKS[1], &mut stats, resources)?;
     let mut turn = 0;
     for look in [Look::First, Look::Second] {
         let (mut look, mut wanted) = (look, everywhere.clone());
