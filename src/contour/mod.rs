@@ -23,6 +23,8 @@ mod count;
 mod maker;
 
 #[cfg(test)]
+mod above_tests;
+#[cfg(test)]
 mod noise_tests;
 mod write;
 

@@ -149,6 +149,22 @@ fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
 
 /// Contours a field by a method and proves what comes of it.
 pub fn contour_by(method: Method, field: &Field, backing: Backing, threads: usize) -> Contoured {
+    let unit = SnapBox { lo: [0.0; 3], hi: [1.0; 3] };
+    let domain = Domain::around(&unit, DEPTH, false).expect("room enough");
+    let brick = |key| field.brick(BrickKey(key).position(), f64::from(domain.cell_units));
+    let options = ContourOptions { method, crease_deg: 12.0, decimate_cells: field.decimate_cells };
+    contour_bricks(&domain, (0..8).map(|key| (key, brick(key))), &options, backing, threads)
+}
+
+/// Contours bricks of signs and proves what comes of it.
+pub fn contour_bricks(
+    domain: &Domain,
+    bricks: impl Iterator<Item = (u64, SignBrick)>,
+    options: &ContourOptions,
+    backing: Backing,
+    threads: usize,
+) -> Contoured {
+    let method = options.method;
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
@@ -161,28 +177,23 @@ pub fn contour_by(method: Method, field: &Field, backing: Backing, threads: usiz
         checkpoints: &NoCheckpoints,
         monitor: &Void,
     };
-    let unit = SnapBox { lo: [0.0; 3], hi: [1.0; 3] };
-    let domain = Domain::around(&unit, DEPTH, false).expect("room enough");
     let mut writer = BrickWriter::create(&scratch, "signs", backing).expect("room");
-    for key in 0..8 {
-        let brick = field.brick(BrickKey(key).position(), f64::from(domain.cell_units));
+    for (key, brick) in bricks {
         writer.append(key, 0, &encode(&brick)).expect("room");
     }
     let signs = writer.finish(2).expect("room");
-    let decimate_cells = field.decimate_cells;
-    let options = ContourOptions { method, crease_deg: 12.0, decimate_cells };
     let (cells, placed) =
-        place_vertices(&signs, &domain, &options, &resources).expect("sound bricks");
+        place_vertices(&signs, domain, options, &resources).expect("sound bricks");
     let (surface, separated) =
-        separate(&signs, &cells, &domain, &options, &placed, &resources).expect("sound bricks");
+        separate(&signs, &cells, domain, options, &placed, &resources).expect("sound bricks");
     if method != Method::Mc {
         for file in [&cells, &surface] {
-            assert_vertices_lie_in_their_cells(file, &domain);
+            assert_vertices_lie_in_their_cells(file, domain);
         }
     }
     let mut kept = Kept::default();
     let files = (&cells, &surface);
-    let stats = write_surface(files, &domain, &options, (&separated, None), &mut kept, &resources)
+    let stats = write_surface(files, domain, options, (&separated, None), &mut kept, &resources)
         .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
     let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };
@@ -199,8 +210,12 @@ fn assert_vertices_lie_in_their_cells(cells: &BrickFile, domain: &Domain) {
         let record = decode_cells(&view).expect("a cell brick");
         for (low, side, vertices) in cut_of(record) {
             for position in &record.positions[vertices] {
+                let reach = record.reaches.iter().find(|r| r.is_granted && r.position == *position);
                 for a in 0..3 {
-                    let low = low[a] as i64 * cell_units;
+                    let mut low = low[a] as i64 * cell_units;
+                    if let Some(reach) = reach.filter(|reach| usize::from(reach.face / 2) == a) {
+                        low += if reach.face % 2 == 1 { cell_units } else { -cell_units };
+                    }
                     let within = i64::from(position[a].to_native()) - low;
                     assert!(0 < within && within < side * cell_units, "{within} of {side} cells");
                 }

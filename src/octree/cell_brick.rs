@@ -38,6 +38,42 @@ pub struct VertexReach {
     pub position: [i32; 3],
 }
 
+/// The planes of a face as far as clusters above the brick know them: all normals are within
+/// `spread` of one, all offsets of points within an interval.
+#[derive(Clone, Copy, Debug, PartialEq, Archive, Serialize, Deserialize)]
+pub struct Facet {
+    /// A unit normal.
+    pub normal: [f64; 3],
+    /// Smallest and largest offset of the planes, in cells from the min corner of the cell.
+    pub offsets: [f64; 2],
+    /// Farthest that the end of another normal is from that of this one.
+    pub spread: f64,
+    /// Sum of the crossings, in cells from that corner.
+    pub points: [f64; 3],
+    /// How many crossings.
+    pub count: f64,
+}
+
+/// What clusters above the brick ask of a brick that is one vertex: a disk with one arc per face.
+#[derive(Clone, Debug, PartialEq, Archive, Serialize, Deserialize)]
+pub struct Summary {
+    /// How often the surface crosses each of the twelve edges, a byte each.
+    pub edges: [u64; 2],
+    /// Its planes.
+    pub facets: Vec<Facet>,
+}
+
+/// The vertex of a cluster above the brick, in each of its bricks.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Archive, Serialize, Deserialize)]
+pub struct Above {
+    /// Level of its cell: 6 to 15.
+    pub level: u32,
+    /// The number in the file of the brick that has the vertex: the first with surface.
+    pub owner: u32,
+    /// Where it is, from the min corner of this brick.
+    pub position: [i32; 3],
+}
+
 /// What contouring leaves of a brick: its cells with their vertices.
 ///
 /// The cut is the set of cells that have vertices of their own: clusters, and the leaf cells that
@@ -65,6 +101,11 @@ pub struct CellBrick {
     pub offsets: Vec<u16>,
     /// Vertices on the faces that the brick owns, by ascending key; numbered after those of cells.
     pub points: Vec<FacePoint>,
+    /// Of a brick that may be part of a larger cluster: what that asks of it.
+    pub summary: Option<Summary>,
+    /// Of a brick that is part of one: its vertex. Then the brick's own cluster has no position,
+    /// but in the brick that owns the vertex.
+    pub above: Option<Above>,
 }
 
 impl ArchiveSize for CellBrick {
@@ -72,7 +113,8 @@ impl ArchiveSize for CellBrick {
         let words = self.cells.len() + self.clusters.len() + self.banned.len();
         let halves = self.offsets.len() + self.flagged.len();
         let places = 12 * self.positions.len() + 24 * self.points.len() + 20 * self.reaches.len();
-        4 * words + 2 * halves + self.members.len() + places + 2 * ROOT_BYTES
+        let facets = self.summary.as_ref().map_or(0, |summary| 80 * summary.facets.len());
+        4 * words + 2 * halves + self.members.len() + places + facets + 3 * ROOT_BYTES
     }
 }
 
@@ -94,7 +136,17 @@ impl ArchivedCellBrick {
     pub fn to_brick(&self) -> CellBrick {
         rkyv::deserialize::<CellBrick, BoxedError>(self).expect("plain vectors deserialise")
     }
+
+    /// What larger clusters ask of it.
+    #[must_use]
+    pub fn to_summary(&self) -> Option<Summary> {
+        rkyv::deserialize::<Option<Summary>, BoxedError>(&self.summary)
+            .expect("plain vectors deserialise")
+    }
 }
+
+/// Highest level of a cluster above the brick: the largest grid.
+const TOP_LEVEL: u32 = 15;
 
 /// Validates a [`CellBrick`].
 ///
@@ -111,6 +163,12 @@ pub fn decode_cells(bytes: &[u8]) -> Result<&ArchivedCellBrick, BrickError> {
     if let Some(reach) = brick.reaches.iter().find(|reach| !is_reach(reach)) {
         let number = u64::from(reach.face) << 16 | u64::from(reach.cell.to_native());
         return Err(out_of_range(kind, "reach", number, 6 << 16));
+    }
+    if let Some(above) = brick.above.as_ref() {
+        let level = above.level.to_native();
+        if !(MAX_LEVEL + 1..=TOP_LEVEL).contains(&level) {
+            return Err(out_of_range(kind, "level", level.into(), u64::from(TOP_LEVEL) + 1));
+        }
     }
     let is_cluster = |cluster: u32| {
         let (first, level) = (cluster & 0x7fff, cluster >> 15 & 7);

@@ -20,7 +20,8 @@ pub use brick::{
     encode,
 };
 pub use cell_brick::{
-    ArchivedCellBrick, CellBrick, FacePoint, MAX_LEVEL, VertexReach, decode_cells,
+    Above, ArchivedCellBrick, CellBrick, FacePoint, Facet, MAX_LEVEL, Summary, VertexReach,
+    decode_cells,
 };
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{

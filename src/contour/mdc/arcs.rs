@@ -9,7 +9,7 @@
 
 use crate::contour::ContourError;
 use crate::contour::mdc::cell::{edge_in_cell, lower_end, segments_on};
-use crate::contour::mdc::loaded::face_point_key;
+use crate::contour::mdc::loaded::{face_point_key, far_point_key};
 use crate::contour::mdc::neighbourhood::{CutBox, Neighbourhood, Patch};
 use crate::contour::mdc::table::{axis_of_edge, edge_at_corner};
 
@@ -59,6 +59,36 @@ const AROUND: [[([i32; 3], u8); 4]; 3] = {
     around
 };
 
+/// The face that two cells of the cut share.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MinimalFace {
+    /// The axis across it.
+    pub axis: usize,
+    /// A box without height.
+    pub face: CutBox,
+}
+
+impl MinimalFace {
+    /// The face point of an arc that leaves the face at these two crossings.
+    pub fn point(&self, ends: [[i32; 3]; 2], cell_units: i32) -> [i32; 3] {
+        let [p, q] = ends.map(|end| end.map(i64::from));
+        let cell = i64::from(cell_units);
+        let middle: [i64; 3] = std::array::from_fn(|a| (p[a] + q[a]) / 2);
+        let [low, high] =
+            [self.face.low, self.face.high].map(|end| end.map(|c| i64::from(c) * cell));
+        let is_inside =
+            (0..3).filter(|a| *a != self.axis).all(|a| low[a] < middle[a] && middle[a] < high[a]);
+        let at: [i64; 3] = if is_inside {
+            middle
+        } else {
+            std::array::from_fn(|a| (p[a] + q[a] + low[a] + high[a]) / 4)
+        };
+        let mut at = at.map(|c| c as i32);
+        at[self.axis] = self.face.low[self.axis] * cell_units;
+        at
+    }
+}
+
 /// The arc between two cells of the cut.
 #[derive(Clone, Copy, Debug)]
 pub struct Arc {
@@ -74,17 +104,37 @@ impl Arc {
     /// The key of its face point in the brick that owns the face, that of the upper cell.
     pub fn key(&self) -> u64 {
         let is_beyond = self.lower.slot != self.upper.slot;
-        let (upper, lower) = (self.upper.vertex.number, self.lower.vertex.number);
+        let (upper, lower) = (self.upper.number_in_brick(), self.lower.number_in_brick());
         face_point_key(self.axis, is_beyond, upper, lower)
     }
 
-    /// The minimal face, which both boxes have: a box without height.
-    fn face(&self) -> CutBox {
+    /// Whether both cells are above the brick: then its ends may be far from each other.
+    #[inline]
+    pub fn is_far(&self) -> bool {
+        self.lower.vertex.cut.is_above() && self.upper.vertex.cut.is_above()
+    }
+
+    /// Whether one vertex is on both sides: then it is none.
+    #[inline]
+    pub fn is_inner(&self) -> bool {
+        self.lower.id() == self.upper.id()
+    }
+
+    /// The brick that owns the face point of an arc between two cells above the brick, the one
+    /// that has the vertex of the smaller; and its key there.
+    pub fn far_key(&self) -> (usize, u64) {
+        let is_upper = self.upper.vertex.cut.level() < self.lower.vertex.cut.level();
+        let smaller = if is_upper { self.upper } else { self.lower };
+        (smaller.vertex.number as usize, far_point_key(self.axis, is_upper))
+    }
+
+    /// The minimal face, which both boxes have.
+    pub fn minimal_face(&self) -> MinimalFace {
         let (lower, upper) = (self.lower.cut_box(), self.upper.cut_box());
         let mut low: [i32; 3] = std::array::from_fn(|a| lower.low[a].max(upper.low[a]));
         let mut high: [i32; 3] = std::array::from_fn(|a| lower.high[a].min(upper.high[a]));
         (low[self.axis], high[self.axis]) = (upper.low[self.axis], upper.low[self.axis]);
-        CutBox { low, high }
+        MinimalFace { axis: self.axis, face: CutBox { low, high } }
     }
 
     /// Whether the face point is a vertex.
@@ -99,7 +149,7 @@ impl Arc {
             // The union of two equal cells is convex.
             return true;
         }
-        let face = self.face();
+        let MinimalFace { face, .. } = self.minimal_face();
         let from = self.lower.vertex.position.map(i64::from);
         let to = self.upper.vertex.position.map(i64::from);
         let cell = i64::from(cell_units);
@@ -114,21 +164,7 @@ impl Arc {
 
     /// The face point of an arc that leaves its face at these two crossings.
     pub fn point(&self, ends: [[i32; 3]; 2], cell_units: i32) -> [i32; 3] {
-        let face = self.face();
-        let [p, q] = ends.map(|end| end.map(i64::from));
-        let cell = i64::from(cell_units);
-        let middle: [i64; 3] = std::array::from_fn(|a| (p[a] + q[a]) / 2);
-        let [low, high] = [face.low, face.high].map(|end| end.map(|c| i64::from(c) * cell));
-        let is_inside =
-            (0..3).filter(|a| *a != self.axis).all(|a| low[a] < middle[a] && middle[a] < high[a]);
-        let at: [i64; 3] = if is_inside {
-            middle
-        } else {
-            std::array::from_fn(|a| (p[a] + q[a] + low[a] + high[a]) / 4)
-        };
-        let mut at = at.map(|c| c as i32);
-        at[self.axis] = face.low[self.axis] * cell_units;
-        at
+        self.minimal_face().point(ends, cell_units)
     }
 
     /// Whether the arc ends at an edge of the fine face below cell `above`: not if it goes on
@@ -187,6 +223,8 @@ pub struct Polygon {
     /// How many vertices.
     pub count: usize,
     patches: [Patch; 4],
+    /// The vertices of the four cells.
+    ring: [Patch; 4],
     /// In which of the four cells around the edge each vertex' turn ends.
     last: [u8; 4],
 }
@@ -202,7 +240,7 @@ impl Polygon {
 
     /// The polygon of these four vertices; `None` if fewer than three differ.
     pub fn of_ring(edge: Edge, ring: [Patch; 4]) -> Option<Self> {
-        let mut polygon = Self { edge, count: 0, patches: ring, last: [0; 4] };
+        let mut polygon = Self { edge, count: 0, patches: ring, ring, last: [0; 4] };
         for slot in 0..4 {
             // A vertex stands where its turn ends.
             if ring[slot].id() != ring[(slot + 1) % 4].id() {
@@ -221,11 +259,12 @@ impl Polygon {
 
     /// The arc from vertex `i` to the next.
     pub fn arc(&self, i: usize) -> Arc {
-        let (this, next) = (self.patches[i], self.patches[(i + 1) % self.count]);
+        // The very cells at the face: those of a cell above the brick may lie in two bricks.
+        let last = usize::from(self.last[i]);
+        let (this, next) = (self.ring[last], self.ring[(last + 1) % 4]);
         let (u, v) = ((self.edge.axis + 1) % 3, (self.edge.axis + 2) % 3);
         // From (-,-) up along u, up along v, down along u, down along v.
-        let (axis, is_up) =
-            [(u, true), (v, true), (u, false), (v, false)][usize::from(self.last[i])];
+        let (axis, is_up) = [(u, true), (v, true), (u, false), (v, false)][last];
         if is_up {
             Arc { axis, lower: this, upper: next }
         } else {
@@ -254,7 +293,10 @@ impl Polygon {
         let (low, high) = boxes.fold((i32::MIN, i32::MAX), |(low, high), cut| {
             (low.max(cut.low[axis]), high.min(cut.high[axis]))
         });
-        for along in (low..high).filter(|along| *along != lower[axis]) {
+        // An edge of a cell above the brick is crossed once at most. Others lie in one brick.
+        let is_above = self.patches().iter().all(|patch| patch.vertex.cut.is_above());
+        let others = if is_above { 0..0 } else { low..high };
+        for along in others.filter(|along| *along != lower[axis]) {
             let mut other = lower;
             other[axis] = along;
             if nb.is_crossed(axis, other)? {

@@ -12,6 +12,7 @@
 
 use crate::contour::mdc::arcs::{Arc, Edge, edges_of};
 use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
+use crate::contour::mdc::far_points::FarPoints;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::Neighbourhood;
 use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, HAS_REACHES, flags_of};
@@ -33,6 +34,7 @@ pub fn add(
     stats: &mut ContourStats,
     resources: &Resources,
 ) -> Result<BrickFile, ContourError> {
+    let far = FarPoints::find(layers, domain, resources)?;
     let mut writer = BrickWriter::create(resources.scratch, SURFACE, resources.backing)?;
     let mut numbers = (0..layers.bricks())
         .filter(|number| layers.is_anew(*number) || may_have_points(layers, *number));
@@ -49,7 +51,9 @@ pub fn add(
         || Neighbourhood::new(*layers, domain),
         |nb, number| {
             let _brick = resident.hold(1);
-            let points = face_points(nb, number)?;
+            let mut points = face_points(nb, number)?;
+            points.extend(far.of_brick(number));
+            points.sort_unstable_by_key(|point| point.key);
             if points.is_empty() && !layers.is_anew(number) {
                 return Ok(None);
             }
@@ -127,7 +131,7 @@ fn add_ends(
             let edge =
                 crate::contour::mdc::cell::edge_in_cell(edges[0].axis, edges[0].lower, below);
             let arc = Arc { axis, lower: nb.vertex(there, edge), upper };
-            if arc.is_explicit(nb.cell_units()) {
+            if !arc.is_inner() && !arc.is_far() && arc.is_explicit(nb.cell_units()) {
                 let is_end = |edge: &Edge| arc.ends_at(edge, at);
                 ends.extend(edges.into_iter().filter(is_end).map(|edge| (arc.key(), arc, edge)));
             }

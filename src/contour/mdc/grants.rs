@@ -12,6 +12,7 @@
 //! Source:     ours.
 
 use std::collections::HashMap;
+use std::ops::Range;
 
 use crate::contour::ContourError;
 use crate::contour::mdc::cell::{cell_number, number_at, place_of};
@@ -73,17 +74,19 @@ struct Grounds<'l> {
 }
 
 impl Grounds<'_> {
+    /// The brick of a cell; `None` outside of the grid.
+    fn key_at(&self, place: [i32; 3]) -> Option<BrickKey> {
+        let mut position = self.key.position();
+        for (coordinate, c) in position.iter_mut().zip(place) {
+            *coordinate = coordinate.checked_add_signed(c.div_euclid(SIDE as i32))?;
+        }
+        Some(BrickKey::new(position))
+    }
+
     /// The brick of a cell, and the cell's number there; `None` where no surface is.
     fn at(&mut self, place: [i32; 3]) -> Result<Option<(&Ground, usize)>, ContourError> {
         let side = SIDE as i32;
-        let mut position = self.key.position();
-        for (coordinate, c) in position.iter_mut().zip(place) {
-            let Some(moved) = coordinate.checked_add_signed(c.div_euclid(side)) else {
-                return Ok(None);
-            };
-            *coordinate = moved;
-        }
-        let key = BrickKey::new(position);
+        let Some(key) = self.key_at(place) else { return Ok(None) };
         if !self.known.contains_key(&key.0) {
             let ground = match self.layers.find(key) {
                 Some(number) => {
@@ -118,11 +121,16 @@ impl Grounds<'_> {
     }
 }
 
-/// Grants what can be granted in brick `number`.
+/// Grants what can be granted in brick `number`; nothing in bricks with keys in `covered`, which
+/// ascend.
 ///
 /// # Errors
 /// [`ContourError`].
-pub fn grant(layers: &Layers, number: usize) -> Result<Looked, ContourError> {
+pub fn grant(
+    layers: &Layers,
+    covered: &[Range<u64>],
+    number: usize,
+) -> Result<Looked, ContourError> {
     let key = layers.key(number);
     let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
     let mut grounds = Grounds { layers, key, known: HashMap::new() };
@@ -131,6 +139,9 @@ pub fn grant(layers: &Layers, number: usize) -> Result<Looked, ContourError> {
     for (at, reach) in brick.reaches.iter().enumerate().filter(|(_, reach)| !reach.is_granted) {
         let face = usize::from(reach.face);
         let place = beyond(place_of(usize::from(reach.cell)).map(|c| c as i32), face);
+        if grounds.key_at(place).is_none_or(|key| is_within(key, covered)) {
+            continue;
+        }
         if let Some((ground, cell)) = grounds.at(place)? {
             if ground.has_surface(cell) {
                 continue;
@@ -187,4 +198,10 @@ fn vertex_of(brick: &CellBrick, cell: usize) -> usize {
         }
     }
     vertex
+}
+
+/// Whether a key lies in one of these ranges.
+fn is_within(key: BrickKey, ranges: &[Range<u64>]) -> bool {
+    let after = ranges.partition_point(|range| range.start <= key.0);
+    after.checked_sub(1).is_some_and(|at| ranges[at].contains(&key.0))
 }

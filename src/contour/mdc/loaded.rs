@@ -4,23 +4,45 @@
 
 use crate::contour::ContourError;
 use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of, place_of};
-use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
+use crate::octree::{ArchivedCellBrick, BrickKey, MAX_LEVEL, SIDE};
 
-/// A cell of the cut, packed: number of its first leaf cell (15 bits), level (3 bits at 15), whether
-/// it is flagged (bit 18), whether it has several vertices (bit 19), and one more than the face that
-/// its vertex reaches through (3 bits at 20).
+/// A cell of the cut, packed: number of its first leaf cell (15 bits), level (4 bits at 15), whether
+/// it is flagged (bit 19), whether it has several vertices (bit 20), and one more
+/// than the face that its vertex reaches through (3 bits at 21). Of a cell above the brick, which of
+/// its bricks along each axis this one is (10 bits each at 32).
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CutCell(u32);
+pub struct CutCell(u64);
 
 impl CutCell {
-    const FLAGGED: u32 = 1 << 18;
-    const MULTI: u32 = 1 << 19;
+    const FLAGGED: u64 = 1 << 19;
+    const MULTI: u64 = 1 << 20;
+    const REACHES: u64 = 7 << 21;
 
     /// Packs.
     #[inline]
     pub fn new(first: usize, level: u32, is_flagged: bool, is_multi: bool) -> Self {
         let flagged = if is_flagged { Self::FLAGGED } else { 0 };
-        Self(first as u32 | level << 15 | flagged | if is_multi { Self::MULTI } else { 0 })
+        let multi = if is_multi { Self::MULTI } else { 0 };
+        Self(first as u64 | u64::from(level) << 15 | flagged | multi)
+    }
+
+    /// The cell above the brick at `brick`, which has one vertex.
+    pub fn above(level: u32, brick: [u32; 3]) -> Self {
+        let last = (1_u64 << (level - MAX_LEVEL)) - 1;
+        let [x, y, z] = brick.map(|c| u64::from(c) & last);
+        Self(u64::from(level) << 15 | x << 32 | y << 42 | z << 52)
+    }
+
+    /// Of a cell above the brick, which of its bricks along each axis this is.
+    #[inline]
+    pub fn brick_in_it(self) -> [i32; 3] {
+        [32, 42, 52].map(|shift| (self.0 >> shift & 0x3ff) as i32)
+    }
+
+    /// Whether it is larger than a brick.
+    #[inline]
+    pub fn is_above(self) -> bool {
+        self.level() > MAX_LEVEL
     }
 
     /// The number of its first leaf cell.
@@ -32,7 +54,7 @@ impl CutCell {
     /// 0 for a leaf cell.
     #[inline]
     pub fn level(self) -> u32 {
-        self.0 >> 15 & 7
+        (self.0 >> 15 & 15) as u32
     }
 
     /// Whether all its face points are vertices.
@@ -50,38 +72,38 @@ impl CutCell {
     /// The same cell, whose vertex reaches through `face`.
     #[inline]
     pub fn reaching(self, face: u8) -> Self {
-        Self(self.0 | (u32::from(face) + 1) << 20)
+        Self(self.0 | (u64::from(face) + 1) << 21)
     }
 
     /// The face that its vertex reaches through into the cell beyond.
     #[inline]
     pub fn reaches(self) -> Option<usize> {
-        (self.0 >> 20 & 7).checked_sub(1).map(|face| face as usize)
+        (self.0 >> 21 & 7).checked_sub(1).map(|face| face as usize)
     }
 
     /// Whether its box is that of a leaf cell.
     #[inline]
     pub fn is_unit(self) -> bool {
-        self.0 & (7 << 15 | 7 << 20) == 0
+        self.0 & (15 << 15 | Self::REACHES) == 0
     }
 
     /// Whether it is a leaf cell that is not flagged, and its vertex is in it.
     #[inline]
     pub fn is_plain(self) -> bool {
-        self.0 & (7 << 15 | 7 << 20 | Self::FLAGGED) == 0
+        self.0 & (15 << 15 | Self::REACHES | Self::FLAGGED) == 0
     }
 
     /// Whether both boxes are cubes of one size.
     #[inline]
     pub fn is_as_large_as(self, other: Self) -> bool {
-        self.level() == other.level() && (self.0 | other.0) >> 20 & 7 == 0
+        self.level() == other.level() && (self.0 | other.0) & Self::REACHES == 0
     }
 }
 
 /// A vertex of a brick.
 #[derive(Clone, Copy, Debug)]
 pub struct Vertex {
-    /// Its number in the brick.
+    /// Its number in the brick; of a cell above the brick, the number of the brick that owns it.
     pub number: u32,
     /// Units from the min corner of the brick that looks.
     pub position: [i32; 3],
@@ -213,6 +235,11 @@ impl Loaded {
             |position: [i32; 3]| -> [i32; 3] { std::array::from_fn(|a| position[a] + shift[a]) };
         let wrong = |expected| ContourError::Contradiction { brick: key.position(), expected };
         let is_whole = steps == [0; 3];
+        let above = record.above.as_ref().map(|above| Vertex {
+            number: above.owner.to_native(),
+            position: moved(above.position.map(|c| c.to_native())),
+            cut: CutCell::above(above.level.to_native(), key.position()),
+        });
         let mut loaded = Self::with_room(if is_whole { record.cells.len() } else { 0 });
         let mut walk = CutWalk::new(record);
         let mut offset = 0;
@@ -234,7 +261,11 @@ impl Loaded {
                 } else {
                     first + component
                 };
-                if is_wanted {
+                if let Some(vertex) = above {
+                    if is_wanted {
+                        loaded.vertices.push(vertex);
+                    }
+                } else if is_wanted {
                     let position = record.positions.get(number as usize);
                     let position = position.ok_or_else(|| wrong("a position for every vertex"))?;
                     let position = moved(position.map(|c| c.to_native()));
@@ -279,6 +310,12 @@ impl Loaded {
 /// owns the face and `lower`, which may lie in the brick below.
 pub fn face_point_key(axis: usize, is_beyond: bool, upper: u32, lower: u32) -> u64 {
     (axis as u64) << 62 | u64::from(is_beyond) << 61 | u64::from(upper) << 24 | u64::from(lower)
+}
+
+/// The key of a vertex on the face across `axis` between two cells above the brick, in the brick
+/// that owns the vertex of the smaller one, which is the upper one or the lower one.
+pub fn far_point_key(axis: usize, is_upper: bool) -> u64 {
+    (axis as u64) << 62 | 1 << 60 | u64::from(is_upper) << 59
 }
 
 /// Whether a cell of a brick so many steps away touches the brick at no steps.

@@ -9,12 +9,14 @@
 
 pub mod table;
 
+mod above;
 mod angles;
 mod arcs;
 mod around_cell;
 mod cell;
 mod cluster;
 mod face_points;
+mod far_points;
 mod features;
 mod grants;
 mod layers;
@@ -49,8 +51,12 @@ const HAS_MULTI: u32 = 1 << 31;
 const HAS_CLUSTERS: u32 = 1 << 30;
 /// In the flags of a brick of cells: it has flagged cells.
 const HAS_FLAGGED: u32 = 1 << 29;
+/// In the flags of a brick of cells: it may be part of a cluster above the brick.
+const HAS_SUMMARY: u32 = 1 << 28;
+/// In the flags of a brick of cells: it is part of a cluster above the brick.
+const IS_IN_ABOVE: u32 = 1 << 27;
 /// In the flags of a brick of cells: vertices may reach beyond their cells.
-const HAS_REACHES: u32 = 1 << 28;
+const HAS_REACHES: u32 = 1 << 26;
 
 /// What the directory says of a brick of cells.
 fn flags_of(brick: &CellBrick) -> u32 {
@@ -61,6 +67,8 @@ fn flags_of(brick: &CellBrick) -> u32 {
         | if brick.clusters.is_empty() { 0 } else { HAS_CLUSTERS }
         | if brick.reaches.is_empty() { 0 } else { HAS_REACHES }
         | if brick.flagged.is_empty() { 0 } else { HAS_FLAGGED }
+        | if brick.summary.is_some() { HAS_SUMMARY } else { 0 }
+        | if brick.above.is_some() { IS_IN_ABOVE } else { 0 }
 }
 
 /// Whether a leaf cell that no cluster covers has several vertices.
@@ -96,6 +104,10 @@ pub fn cut_of(
             None => (number, 0, u32::from(components_of(cell).count)),
         };
         end = first + (1 << (3 * level));
+        if record.above.is_some() {
+            // Its vertex lies anywhere in a larger cell, and in one brick only.
+            return cut;
+        }
         let next = vertices + count as usize;
         cut.push((cell::place_of(first), 1 << level, vertices..next));
         vertices = next;

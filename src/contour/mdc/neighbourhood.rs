@@ -22,6 +22,9 @@ const NO_RANK: u16 = u16::MAX;
 /// middles of middles of two of them are on the lattice.
 pub const CROSSING_UNITS: i32 = 4;
 
+/// Names of vertices of cells above the brick, beside those of others.
+const ABOVE: u64 = 1 << 42;
+
 /// A leaf cell that was found: the brick among the 27, and its rank there.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Found {
@@ -42,7 +45,16 @@ impl Patch {
     /// A name for the vertex, distinct in this neighbourhood.
     #[inline]
     pub fn id(&self) -> u64 {
+        if self.vertex.cut.is_above() {
+            return ABOVE | u64::from(self.vertex.number);
+        }
         (self.slot as u64) << 24 | u64::from(self.vertex.number)
+    }
+
+    /// Its number among the vertices of the brick in its slot.
+    #[inline]
+    pub fn number_in_brick(&self) -> u32 {
+        if self.vertex.cut.is_above() { 0 } else { self.vertex.number }
     }
 
     /// The box of its cell of the cut, with the empty cell that it reaches into.
@@ -66,7 +78,9 @@ impl CutBox {
     pub fn new(slot: usize, cut: CutCell) -> Self {
         let place = place_of(cut.first());
         let steps = steps_of(slot);
-        let mut low: [i32; 3] = std::array::from_fn(|a| place[a] as i32 + steps[a] * SIDE as i32);
+        let brick = cut.brick_in_it();
+        let mut low: [i32; 3] =
+            std::array::from_fn(|a| place[a] as i32 + (steps[a] - brick[a]) * SIDE as i32);
         let mut high = low.map(|c| c + (1 << cut.level()));
         if let Some(face) = cut.reaches() {
             if face % 2 == 1 {
@@ -76,6 +90,12 @@ impl CutBox {
             }
         }
         Self { low, high }
+    }
+
+    /// The same box, moved.
+    pub fn moved(self, by: [i32; 3]) -> Self {
+        let add = |end: [i32; 3]| std::array::from_fn(|a| end[a] + by[a]);
+        Self { low: add(self.low), high: add(self.high) }
     }
 
     /// Whether a leaf cell lies in it.
@@ -147,11 +167,6 @@ impl<'f> Neighbourhood<'f> {
     /// All bricks.
     pub fn layers(&self) -> &Layers<'f> {
         &self.layers
-    }
-
-    /// The own brick's key.
-    pub fn key(&self) -> BrickKey {
-        self.key
     }
 
     /// Lattice units of a cell.
@@ -288,6 +303,30 @@ impl<'f> Neighbourhood<'f> {
         let step = ((i64::from(offset) * steps + (1 << 15)) >> 16).clamp(1, steps - 1);
         crossing[axis] += step as i32 * CROSSING_UNITS;
         crossing
+    }
+
+    /// The vertex on the face between two cells above the brick, if there is one, `key` of it in
+    /// brick `owner`: its number there, and its place from here.
+    ///
+    /// # Errors
+    /// [`ContourError`].
+    pub fn far_point(
+        &self,
+        owner: usize,
+        key: u64,
+    ) -> Result<Option<(u32, [i32; 3])>, ContourError> {
+        let (here, there) = (self.key.position(), self.layers.key(owner).position());
+        let units = self.domain.brick_units() as i32;
+        self.layers.read(owner, |record| {
+            let found = record.points.binary_search_by_key(&key, |point| point.key.to_native());
+            Ok(found.ok().map(|at| {
+                let position = record.points[at].position.map(|c| c.to_native());
+                let place = std::array::from_fn(|a| {
+                    position[a] + (there[a] as i32 - here[a] as i32) * units
+                });
+                ((record.positions.len() + at) as u32, place)
+            }))
+        })
     }
 
     /// A place in model units.

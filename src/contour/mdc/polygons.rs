@@ -98,7 +98,9 @@ impl<'p> Polygons<'p> {
             // In the same cluster all around, which has one vertex: no polygon.
             let inner = if cut.level() > 0 && !cut.is_multi() {
                 let low = (1 << cut.level()) - 1;
-                (0..3).fold(0_u8, |inner, a| inner | u8::from(at[a] & low != 0) << a)
+                let brick = cut.brick_in_it();
+                let is_inner = |a: usize| at[a] & low != 0 || brick[a] != 0;
+                (0..3).fold(0_u8, |inner, a| inner | u8::from(is_inner(a)) << a)
             } else {
                 0
             };
@@ -166,15 +168,18 @@ impl<'p> Polygons<'p> {
             is_flagged |= patch.vertex.cut.is_flagged();
             let arc = polygon.arc(i);
             if arc.is_explicit(self.nb.cell_units()) {
-                let key = arc.key();
-                let slot = arc.upper.slot;
-                let Some((number, position)) = self.nb.sound_brick(slot)?.point(key) else {
-                    return Err(ContourError::Contradiction {
-                        brick: self.nb.key().position(),
-                        expected: "a vertex on a face that a segment misses",
-                    });
+                let (brick, point) = if arc.is_far() {
+                    let (owner, key) = arc.far_key();
+                    (owner, self.nb.far_point(owner, key)?)
+                } else {
+                    let slot = arc.upper.slot;
+                    let point = self.nb.sound_brick(slot)?.point(arc.key());
+                    (self.nb.number_of(slot), point)
                 };
-                let number = self.bases[self.nb.number_of(slot)] + number;
+                let Some((number, position)) = point else {
+                    return Err(self.nb.contradiction("a vertex on a face that a segment misses"));
+                };
+                let number = self.bases[brick] + number;
                 corners[ring.points().len()] = Corner { number, position };
                 ring.push(LoopPoint { position, id: 0, is_leaf: false, is_face_point: true });
             }
@@ -197,7 +202,11 @@ impl<'p> Polygons<'p> {
 
     #[inline]
     fn corner(&self, patch: &Patch) -> Corner {
-        let number = self.bases[self.nb.number_of(patch.slot)] + patch.vertex.number;
+        let number = if patch.vertex.cut.is_above() {
+            self.bases[patch.vertex.number as usize]
+        } else {
+            self.bases[self.nb.number_of(patch.slot)] + patch.vertex.number
+        };
         Corner { number, position: patch.vertex.position }
     }
 

@@ -1,8 +1,9 @@
 //! Keeps surfaces apart that pass through one cell: which cells are flagged, and which split.
 //!
 //! In:         bricks of cells, and the signs that they were made from.
-//! Out:        the bricks that changed, anew: flagged cells with their vertices, clusters that were
-//!             split, and all face points that are vertices.
+//! Out:        the bricks that changed, anew: those of clusters above the brick ([`above`]),
+//!             flagged cells with their vertices, clusters that were split, and all face points
+//!             that are vertices.
 //! Invariant:  no two triangles of the surface that is drawn from these bricks meet anywhere but
 //!             in shared vertices and edges. A cell with one vertex cannot meet itself: its piece
 //!             is a cone over a simple curve. One with several is flagged if triangles that it may
@@ -16,12 +17,14 @@
 //!             edges, was found by going through all cells; the face points after Ju and Udeshi
 //!             2006.
 
+use std::ops::Range;
+
 use crate::contour::mdc::grants::grant;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::look::{Look, Looked, look_at};
 use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
 use crate::contour::mdc::vertices::Workspace;
-use crate::contour::mdc::{HAS_MULTI, HAS_REACHES, face_points, flags_of};
+use crate::contour::mdc::{HAS_MULTI, HAS_REACHES, above, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, encode};
@@ -48,9 +51,12 @@ pub fn separate(
     resources: &Resources,
 ) -> Result<(BrickFile, ContourStats), ContourError> {
     let mut stats = *placed;
-    let separation = Separation { signs, cells, domain, options, resources };
-    let mut state = State { anew: None, turn: 0 };
     let everywhere = vec![true; cells.len()];
+    let above = above::cluster(cells, domain, options, LOOKS[1], &mut stats, resources)?;
+    // The next pass reads the file that the one after it will write.
+    let mut state = State { anew: above.bricks, turn: 0 };
+    let covered = above.covered;
+    let separation = Separation { signs, cells, covered, domain, options, resources };
     separation.settle(&mut state, Vec::new(), &mut everywhere.clone(), &mut stats)?;
     for look in [Look::First, Look::Second] {
         let (mut look, mut wanted) = (look, everywhere.clone());
@@ -104,6 +110,8 @@ struct Found {
 struct Separation<'s> {
     signs: &'s BrickFile,
     cells: &'s BrickFile,
+    /// Keys of bricks that clusters above the brick cover.
+    covered: Vec<Range<u64>>,
     domain: &'s Domain,
     options: &'s ContourOptions,
     resources: &'s Resources<'s>,
@@ -131,7 +139,8 @@ impl Separation<'_> {
             if !(0..layers.bricks()).any(|number| has_reaches(&layers, number)) {
                 return Ok(());
             }
-            let found = self.pass(state, has_reaches, |nb, number| grant(nb.layers(), number))?;
+            let found = self
+                .pass(state, has_reaches, |nb, number| grant(nb.layers(), &self.covered, number))?;
             self.add_near(found.grown.into_iter(), wanted);
             if found.banned.is_empty() {
                 return Ok(());

@@ -134,18 +134,23 @@ pub struct Workspace {
     beyond: HashMap<u64, CornerBits>,
 }
 
+/// How the vertices of cells and of clusters are placed.
+pub fn cluster_options(domain: &Domain, options: &ContourOptions) -> ClusterOptions {
+    let cell_units = i64::from(domain.cell_units);
+    let inset = 0.5 - INSET_UNITS as f64 / cell_units as f64;
+    ClusterOptions {
+        threshold_cells: options.decimate_cells,
+        qef: QefOptions::new(options.crease_deg, DVec3::splat(-inset), DVec3::splat(inset)),
+        cell_units,
+        inset_units: INSET_UNITS,
+    }
+}
+
 impl Workspace {
     /// A workspace for bricks of this domain.
     pub fn new(domain: &Domain, options: &ContourOptions) -> Self {
-        let cell_units = i64::from(domain.cell_units);
-        let inset = 0.5 - INSET_UNITS as f64 / cell_units as f64;
-        let qef = QefOptions::new(options.crease_deg, DVec3::splat(-inset), DVec3::splat(inset));
-        let cluster_options = ClusterOptions {
-            threshold_cells: options.decimate_cells,
-            qef,
-            cell_units,
-            inset_units: INSET_UNITS,
-        };
+        let cluster_options = cluster_options(domain, options);
+        let ClusterOptions { qef, cell_units, .. } = cluster_options;
         Self {
             cell_units,
             qef,
@@ -204,6 +209,7 @@ impl Workspace {
             stats.refused_by_shape += clustering.refusals.by_shape;
             stats.cluster_error_cells = clustering.refusals.largest_error;
             brick.drop_covered_reaches();
+            brick.summary = clustering.summary(&brick, &self.leaves);
         }
         stats.crossed_edges += brick.offsets.len() as u64;
         stats.clusters += brick.clusters.len() as u64;

@@ -17,6 +17,7 @@ mod cut;
 mod judge;
 mod node;
 mod planes;
+mod summary;
 
 #[cfg(test)]
 mod tests;
@@ -26,6 +27,7 @@ use std::ops::Range;
 use glam::DVec3;
 
 pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
+pub use summary::{Part, join};
 
 use crate::contour::mdc::cell::{cell_number, components_of, number_at, place_of, segments_on};
 use crate::contour::mdc::cluster::corners::Corner;

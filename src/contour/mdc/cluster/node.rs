@@ -44,6 +44,27 @@ impl EdgeCounts {
         (low.wrapping_mul(ONES) >> 56) as u32 + (high.wrapping_mul(ONES) >> 56) as u32
     }
 
+    /// Those of a record.
+    pub const fn from_words(words: [u64; 2]) -> Self {
+        Self(words)
+    }
+
+    /// Those that a record has.
+    pub const fn words(self) -> [u64; 2] {
+        self.0
+    }
+
+    /// Whether no edge is crossed twice.
+    pub const fn are_single(&self) -> bool {
+        const ONES: u64 = 0x0101_0101_0101_0101;
+        (self.0[0] | self.0[1]) & !ONES == 0
+    }
+
+    /// Whether an edge of `face` is crossed.
+    pub fn is_on_face(&self, face: usize) -> bool {
+        self.on(&FACES[face]).sum() != 0
+    }
+
     #[inline]
     const fn on(&self, edges: &Self) -> Self {
         Self([self.0[0] & edges.0[0], self.0[1] & edges.0[1]])
