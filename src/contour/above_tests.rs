@@ -161,7 +161,7 @@ fn faces_between_clusters_of_many_bricks_have_points() {
         let at = DVec3::splat(64.0) + DVec3::new(20.0, 25.0, 8.0);
         solid.noise.push((at, at + 9.0));
         let found = solid.contour(0.2, Backing::Memory, 1);
-        far += found.stats.face_points;
+        far += found.far_points;
         assert!(found.stats.cut_vertices < found.stats.cell_vertices);
     }
     assert!(far > 0);

@@ -141,6 +141,8 @@ pub struct Contoured {
     pub kept: Kept,
     pub proof: Proof,
     pub stats: ContourStats,
+    /// Face points between clusters above the brick.
+    pub far_points: usize,
 }
 
 fn contour(field: &Field, backing: Backing, threads: usize) -> Contoured {
@@ -191,6 +193,7 @@ pub fn contour_bricks(
             assert_vertices_lie_in_their_cells(file, domain);
         }
     }
+    let far_points = if method == Method::Mdc { far_points_of(&surface) } else { 0 };
     let mut kept = Kept::default();
     let files = (&cells, &surface);
     let stats = write_surface(files, domain, options, (&separated, None), &mut kept, &resources)
@@ -200,7 +203,16 @@ pub fn contour_bricks(
     let proof_options =
         ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked, intersections: true };
     let proof = prove(&mut open, &scratch, &proof_options, &pool, &Void).expect("room");
-    Contoured { kept, proof, stats }
+    Contoured { kept, proof, stats, far_points }
+}
+
+fn far_points_of(surface: &BrickFile) -> usize {
+    let of_brick = |number| {
+        let view = surface.view(number).expect("readable");
+        let points = &decode_cells(&view).expect("a cell brick").points;
+        points.iter().filter(|point| point.key.to_native() >> 60 & 1 == 1).count()
+    };
+    (0..surface.len()).map(of_brick).sum()
 }
 
 fn assert_vertices_lie_in_their_cells(cells: &BrickFile, domain: &Domain) {
@@ -225,7 +237,7 @@ fn assert_vertices_lie_in_their_cells(cells: &BrickFile, domain: &Domain) {
 }
 
 fn assert_sound(found: &Contoured, name: &str) {
-    let Contoured { kept, proof, stats } = found;
+    let Contoured { kept, proof, stats, .. } = found;
     assert!(proof.holds(), "{name}: {:?}", proof.failures());
     assert_eq!(proof.unused_vertices, 0, "{name}");
     assert_eq!(stats.vertices, kept.vertices.len() as u64, "{name}");

@@ -7,7 +7,7 @@ use crate::contour::noise_tests::{Contoured, Field, contour_by};
 use crate::store::Backing;
 
 fn assert_sound(found: &Contoured, name: &str) {
-    let Contoured { kept, proof, stats } = found;
+    let Contoured { kept, proof, stats, .. } = found;
     assert!(proof.holds(), "{name}: {:?}", proof.failures());
     assert_eq!(proof.unused_vertices, 0, "{name}");
     assert_eq!(stats.vertices, kept.vertices.len() as u64, "{name}");
