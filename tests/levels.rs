@@ -13,8 +13,7 @@ use brickmend::io::Format;
 use brickmend::mesh::shapes::{Random, sphere};
 use brickmend::monitor::{Counter, Monitor, Void};
 use brickmend::repair::{
-    Blame, Depth, Levels, Limits, Outcome, Reach, RepairError, Settings, estimate, repair,
-    repair_levels,
+    Blame, Levels, Limits, Outcome, Reach, RepairError, Settings, estimate, repair, repair_levels,
 };
 use brickmend::store::Backing;
 use tempfile::TempDir;
@@ -345,11 +344,10 @@ fn more_triangles_than_any_threshold_leaves_are_refused_with_the_fewest() {
     let RepairError::TooManyTriangles { limit: 4, fewest } = error else { panic!("{error}") };
     let left = std::fs::read_dir(folder.path()).expect("readable").count();
     assert_eq!(left, 0, "something is left over");
-    let coarse = Settings { depth: Depth::Levels(DEPTH - 1), ..at_depth(DEPTH) };
-    let coarse = Settings { max_triangles: Some(fewest), ..coarse };
+    let least = Settings { max_triangles: Some(fewest), ..at_depth(DEPTH) };
     let limits = Limits::default();
-    let coarse = model.workshop.repair(&model.path, "ply", &coarse, &limits).expect("a result");
-    assert!(coarse.outcome.output.proof.triangles <= fewest);
+    let least = model.workshop.repair(&model.path, "ply", &least, &limits).expect("a result");
+    assert!(least.outcome.output.proof.triangles <= fewest);
     let mc = Settings { method: Method::Mc, max_triangles: Some(fewest), ..at_depth(DEPTH) };
     let error = model.workshop.repair(&model.path, "ply", &mc, &limits).err().expect("refused");
     assert!(matches!(error, RepairError::NothingToMerge { .. }), "{error}");

@@ -124,6 +124,8 @@ fn fins_are_found_alike_whatever_the_memory_and_the_threads() {
     let bytes = limits.map(|limits| {
         let repaired = workshop.repair(&input, "ply", &at_depth(7), &limits).expect("a result");
         assert_eq!(repaired.outcome.found.settle.fins.fins, 2);
+        let left = repaired.path.with_extension("ply.brickmend");
+        assert!(!left.exists(), "nothing is left of the work");
         std::fs::read(repaired.path).expect("it is there")
     });
     assert!(bytes.iter().all(|other| *other == bytes[0]));

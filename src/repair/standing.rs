@@ -12,8 +12,8 @@ use crate::store::Manifest;
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 6] =
-    ["facts.spool", "faces.spool", "even.spool", FACES, LOOKS[0], LOOKS[1]];
+pub const PASSING: [&str; 7] =
+    ["facts.spool", "borders.spool", "faces.spool", "even.spool", FACES, LOOKS[0], LOOKS[1]];
 /// The manifest on its way to its name.
 pub const MANIFEST_NEW: &str = "manifest.new";
 

@@ -11,6 +11,16 @@ use crate::contour::mdc::cluster::planes::{largest_distance, place};
 use crate::contour::mdc::cluster::{Cell, ClusterOptions, Clustering};
 use crate::contour::mdc::reach::SHARP_CELLS;
 
+/// What comes of the vertex of a piece.
+enum Placed {
+    /// It lies there on the lattice, so far from a plane at most.
+    Fits([i32; 3], f64),
+    /// It is not in the cell; in a larger one it may be.
+    Outside,
+    /// It lies too far from a plane.
+    TooFar,
+}
+
 impl Clustering {
     /// Makes the cell a cluster if all its pieces allow it; whether a larger one may still be.
     pub(super) fn judge(
@@ -36,19 +46,27 @@ impl Clustering {
         let mut placed = std::mem::take(&mut cut.placed);
         placed.clear();
         let mut largest = 0.0_f64;
-        let fits = (first_node..self.nodes.len()).all(|node| {
-            let vertex = self.place(cut, cell, node);
-            placed.extend(vertex.map(|(vertex, _)| vertex));
-            largest = vertex.map_or(largest, |(_, error)| largest.max(error));
-            vertex.is_some()
-        }) && self.keeps_corners(cut, cell, first_node, &placed);
+        let mut is_near = true;
+        let fits = (first_node..self.nodes.len()).all(|node| match self.place(cut, cell, node) {
+            Placed::Fits(vertex, error) => {
+                placed.push(vertex);
+                largest = largest.max(error);
+                true
+            }
+            Placed::Outside => false,
+            Placed::TooFar => {
+                is_near = false;
+                false
+            }
+        });
+        let fits = fits && self.keeps_corners(cut, cell, first_node, &placed);
         if fits && !cut.is_banned(cell) {
             self.refusals.largest_error = self.refusals.largest_error.max(largest);
             cut.collapse(cell, mark, &placed, &self.node_of, first_node);
         }
         cut.placed = placed;
         self.refusals.by_error += u64::from(!fits);
-        fits
+        is_near
     }
 
     /// Whether every corner of the model that the cell holds has its vertex there.
@@ -96,9 +114,8 @@ impl Clustering {
         })
     }
 
-    /// The vertex of a piece on the lattice, and its largest distance to a plane; `None` if that is
-    /// beyond the threshold.
-    fn place(&self, cut: &Cut, cell: &Cell, number: usize) -> Option<([i32; 3], f64)> {
+    /// Places the vertex of a piece.
+    fn place(&self, cut: &Cut, cell: &Cell, number: usize) -> Placed {
         let node = &self.nodes[number];
         let ClusterOptions { cell_units, inset_units, .. } = self.options;
         let size = (1 << cell.level) as f64;
@@ -114,7 +131,7 @@ impl Clustering {
         let planes = &cut.leaves.planes;
         let solution = place(groups, planes, centre, middle, &options);
         if solution.clamped {
-            return None;
+            return Placed::Outside;
         }
         let at = solution.position + centre;
         let vertex: [i32; 3] = std::array::from_fn(|a| {
@@ -129,10 +146,10 @@ impl Clustering {
             if self.node_of[component] as usize == number {
                 largest = largest.max(largest_distance(cut.hits_of(component), planes, at));
                 if largest > threshold {
-                    return None;
+                    return Placed::TooFar;
                 }
             }
         }
-        Some((vertex, largest))
+        Placed::Fits(vertex, largest)
     }
 }
