@@ -18,7 +18,7 @@ use crate::verify::places::Smallest;
 /// A pair of triangles, by the smaller number first.
 pub(crate) type Pair = [u64; 2];
 
-/// A pair that may be found in several cells, since one of the two is wide, see [`Grid::is_wide`].
+/// A pair that may be found in several cells, since one of the two is wide.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct WidePair {
