@@ -130,3 +130,15 @@ fn fins_are_found_alike_whatever_the_memory_and_the_threads() {
     });
     assert!(bytes.iter().all(|other| *other == bytes[0]));
 }
+
+#[test]
+fn a_sheet_of_many_triangles_was_made_on_purpose_and_stays() {
+    let mut soup = cuboid([-1.0; 3], [1.0; 3]);
+    // Strips that hang from an edge of the box, the first of which it shares.
+    for strip in 0..40 {
+        let z = 1.0 + 0.01 * f64::from(strip);
+        soup.extend(panel([-1.0, -1.0, z], [2.0, 0.0, 0.0], [0.0, 0.0, 0.01]));
+    }
+    let (outcome, _) = with_rule(&soup, SheetRule::Thicken, 6);
+    assert_eq!(outcome.found.settle.fins.triangles, 0);
+}

@@ -4,7 +4,7 @@
 //! is a fin if it hangs on an edge of something else, by less than half of its border, is open on
 //! the rest, and leaves that edge closed when it goes: so a fin that is gone opens nothing. A shelf
 //! that is held on three sides is no fin, and neither are walls around an opening, which are not
-//! flat.
+//! flat. What has many triangles or much area was made on purpose.
 //!
 //! In:         bins, and what is settled about copies in them.
 //! Out:        [`Settled`] with the triangles of fins among the drops.

@@ -18,7 +18,10 @@ use crate::store::{Labels, Resources, Sorter, Spool, SpoolWriter, StoreError, Ta
 const FLAT_SHARE: f64 = 2.0 / 3.0;
 
 /// A sheet with more of the soup's area is a part of its own, however it is held.
-const MOST_AREA_SHARE: f64 = 0.01;
+const MOST_AREA_SHARE: f64 = 0.1;
+
+/// A sheet of more triangles was made on purpose, as the end of a roll of paper is.
+const MOST_TRIANGLES: u32 = 64;
 
 /// Nothing that hangs on an edge of so many triangles is told apart.
 const MOST_USES: usize = 64;
@@ -59,7 +62,9 @@ impl Sheet {
         if self.held == 0.0 {
             return rule == SheetRule::Remove;
         }
-        self.held < self.open && self.area <= MOST_AREA_SHARE * total_area
+        let is_small =
+            self.area <= MOST_AREA_SHARE * total_area && self.triangles <= MOST_TRIANGLES;
+        is_small && self.held < self.open
     }
 }
 
