@@ -8,6 +8,7 @@ use brickmend::repair::{Limits, Outcome, Settings};
 use glam::{DMat3, DVec3};
 
 use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
+use crate::support::soups::prism;
 use crate::support::surface::Surface;
 
 /// A rectangle from `at` along two ways.
@@ -71,26 +72,38 @@ fn a_fin_that_is_wanted_becomes_a_plate() {
     assert!(surface.proof.volume > 8.0);
 }
 
+/// An L-shaped post of two storeys, with a panel in its notch where they meet: held by two of its
+/// four edges.
+fn post_with_a_shelf() -> Vec<Corners> {
+    // All corners are seen from the first one.
+    let profile = [[1.0, 1.0], [1.0, 2.0], [0.0, 2.0], [0.0, 0.0], [2.0, 0.0], [2.0, 1.0]];
+    let mut soup = prism(&profile, 0.0, 1.0);
+    soup.extend(prism(&profile, 1.0, 2.0));
+    soup.extend(panel([1.0, 1.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]));
+    soup
+}
+
 #[test]
-fn a_shelf_held_on_three_sides_and_walls_around_an_opening_are_no_fins() {
-    // A box without its front, turned inside out by a second one: a cupboard with thick walls.
-    let (outer, inner) = (cuboid([-1.0; 3], [1.0; 3]), cuboid([-0.8, -1.0, -0.8], [0.8; 3]));
-    let is_front = |corners: &Corners| corners.iter().all(|c| c[1] == -1.0);
-    let mut soup: Vec<Corners> = outer.into_iter().chain(inner).filter(|c| !is_front(c)).collect();
+fn a_shelf_that_half_of_its_border_holds_is_no_fin() {
+    let soup = post_with_a_shelf();
+    // The floor between the storeys is there twice; where the shelf meets it, an odd number of
+    // other triangles does, so one copy counts. Four of its edges are odd, and two of the shelf.
+    let (outcome, surface) = with_rule(&soup, SheetRule::Thicken, 6);
+    let found = outcome.found.settle;
+    assert_eq!((found.rim_edges, found.interface_triangles), (6, 0));
+    assert_eq!(found.fins.triangles, 0);
+    assert!(outcome.invented.sheet_corners > 0, "it becomes a plate");
+    assert!(surface.proof.volume > 6.0);
+}
+
+#[test]
+fn walls_around_an_opening_are_no_fins() {
+    let mut soup = cuboid([-1.0; 3], [1.0; 3]);
     let rim = [[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]];
     for i in 0..4 {
-        let at = |[x, z]: [f64; 2], size: f64| [x * size, -1.0, z * size];
         let (p, q) = (rim[i], rim[(i + 1) % 4]);
-        soup.push([at(p, 1.0), at(q, 1.0), at(q, 0.8)]);
-        soup.push([at(p, 1.0), at(q, 0.8), at(p, 0.8)]);
-    }
-    let closed = with_rule(&soup, SheetRule::Thicken, 6);
-    assert_eq!((closed.0.found.settle.rim_edges, closed.0.found.settle.fins.fins), (0, 0));
-    // A panel on the floor of the cupboard, along three of its edges, would be the floor again:
-    // walls of four panels on the roof, without a lid, hang from it by four edges.
-    for i in 0..4 {
-        let (p, q) = (rim[i], rim[(i + 1) % 4]);
-        soup.extend(panel([p[0], p[1], 1.0], [q[0] - p[0], q[1] - p[1], 0.0], [0.0, 0.0, 0.1]));
+        let along = [q[0] - p[0], q[1] - p[1], 0.0];
+        soup.extend(panel([p[0], p[1], 1.0], along, [0.0, 0.0, 0.1]));
     }
     let (outcome, _) = with_rule(&soup, SheetRule::Thicken, 6);
     assert!(outcome.found.settle.rim_edges > 0);

@@ -4,13 +4,10 @@
 
 use glam::DVec3;
 
-use crate::contour::noise_tests::{Contoured, contour_bricks};
+use crate::contour::noise_tests::{Contoured, Hit, brick_at, contour_bricks};
 use crate::contour::{ContourOptions, Method};
 use crate::mesh::shapes::Random;
-use crate::octree::{
-    BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, SIDE, SignBrick, SnapBox, SourcePlane,
-    edge_position,
-};
+use crate::octree::{BrickKey, Domain, SIDE, SignBrick, SnapBox, SourcePlane};
 use crate::store::Backing;
 
 /// A convex solid: planes with unit normals outward, offsets in cells of the grid; and dirt.
@@ -74,26 +71,14 @@ impl Solid {
 
     fn brick(&self, key: u64, cell: f64) -> Option<SignBrick> {
         let base = BrickKey(key).position().map(|c| c as usize * SIDE);
-        let mut corners = CornerBits::default();
-        for (row, bits) in corners.rows.iter_mut().enumerate() {
-            for x in 0..LINES {
-                let at = [base[0] + x, base[1] + row % LINES, base[2] + row / LINES];
-                *bits |= u64::from(self.is_inside(at)) << x;
-            }
-        }
-        let mut marks = EdgeBits::default();
-        marks.set_differences(&corners);
-        let base_inside = corners.get([0; 3]);
-        let mut brick = SignBrick { base_inside, ..SignBrick::default() };
         let low = DVec3::from(base.map(|c| c as f64));
-        marks.for_each(|edge| {
-            let (axis, at) = edge_position(edge);
-            let (normal, offset) = self.hit(axis, std::array::from_fn(|a| base[a] + at[a]));
+        let hit = |axis, at| {
+            let (normal, offset) = self.hit(axis, at);
             let offset = (offset - normal.dot(low)) * cell;
             let normal = normal.as_vec3().to_array();
-            brick.planes.push(SourcePlane { offset, normal, ..SourcePlane::default() });
-            brick.crossings.push(Crossing { edge, plane: brick.planes.len() as u32 - 1 });
-        });
+            Hit::Plane(SourcePlane { offset, normal, ..SourcePlane::default() })
+        };
+        let brick = brick_at(base, |at| self.is_inside(at), hit);
         (!brick.crossings.is_empty()).then_some(brick)
     }
 

@@ -8,9 +8,8 @@ use crate::contour::maker::Maker;
 use crate::contour::mdc::Layers;
 use crate::contour::write::number_vertices;
 use crate::contour::{ContourError, ContourOptions};
-use crate::monitor::{Gauge, Resident};
 use crate::octree::Domain;
-use crate::store::{BrickFile, Resources, StoreError, ordered_by_weight};
+use crate::store::{BrickFile, Resources};
 
 /// How many triangles the vertices in `cells`, and in the bricks of `surface` that stand for them,
 /// span.
@@ -26,27 +25,17 @@ pub fn count_triangles(
     let cells = Layers::new(cells, Some(surface));
     let bases = number_vertices(&cells)?;
     let (method, factor) = (options.method, options.method.factors().plain);
-    let mut numbers = 0..cells.bricks();
-    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     let mut triangles = 0;
-    ordered_by_weight(
-        resources.pool,
-        resources.scales(|number: &usize| factor * cells.record_bytes(*number)),
-        || {
-            if resources.monitor.cancelled() {
-                return Err(ContourError::Store(StoreError::Cancelled));
-            }
-            Ok(numbers.next())
-        },
+    cells.each(
+        factor,
+        |_| true,
         || Maker::new(method, cells, &bases, domain, false),
-        |maker, number| {
-            let _brick = resident.hold(1);
-            Ok(maker.triangles(number)?.indices.len() as u64)
-        },
+        |maker, number| Ok(maker.triangles(number)?.indices.len() as u64),
         |more| {
             triangles += more;
             Ok(())
         },
+        resources,
     )?;
     Ok(triangles)
 }

@@ -158,7 +158,8 @@ pub struct ContourStats {
     pub clusters: u64,
     /// Cells that did not because a vertex would lie too far from a plane.
     pub refused_by_error: u64,
-    /// Cells that did not because of the shape of the surface in them.
+    /// Cells that did not because of the shape of the surface in them, or because a vertex would lie
+    /// outside of them.
     pub refused_by_shape: u64,
     /// Largest distance of a cluster's vertex to a plane that it stands for, cells.
     pub cluster_error_cells: f64,
@@ -166,7 +167,8 @@ pub struct ContourStats {
     pub cut_vertices: u64,
     /// Cells whose face points are vertices, so that the surfaces in them stay apart.
     pub flagged_cells: u64,
-    /// Clusters that were split for the same reason.
+    /// Clusters that were split for the same reason, or because the vertex of another brick reaches
+    /// in.
     pub split_clusters: u64,
     /// Vertices on faces between cells.
     pub face_points: u64,

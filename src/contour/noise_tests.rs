@@ -104,36 +104,48 @@ impl Field {
 
     fn brick(&self, position: [u32; 3], cell: f64) -> SignBrick {
         let base = position.map(|c| c as usize * SIDE);
-        let mut corners = CornerBits::default();
-        for (row, bits) in corners.rows.iter_mut().enumerate() {
-            for x in 0..LINES {
-                let at = [base[0] + x, base[1] + row % LINES, base[2] + row / LINES];
-                *bits |= u64::from(self.is_inside(at)) << x;
-            }
-        }
-        let mut marks = EdgeBits::default();
-        marks.set_differences(&corners);
-        let base_inside = corners.get([0; 3]);
-        let mut brick = SignBrick { base_inside, ..SignBrick::default() };
-        marks.for_each(|edge| {
-            let (axis, at) = edge_position(edge);
-            let at = std::array::from_fn(|a| base[a] + at[a]);
-            let plane = match self.hit(axis, at, base, cell) {
-                Hit::Patch(plane) => plane,
-                Hit::Plane(plane) => {
-                    brick.planes.push(plane);
-                    brick.planes.len() as u32 - 1
-                }
-            };
-            brick.crossings.push(Crossing { edge, plane });
-        });
-        brick
+        let hit = |axis, at| self.hit(axis, at, base, cell);
+        brick_at(base, |at| self.is_inside(at), hit)
     }
 }
 
-enum Hit {
+/// What crosses an edge.
+pub enum Hit {
     Patch(u32),
+    /// From the brick's min corner.
     Plane(SourcePlane),
+}
+
+/// The brick whose min corner is `base`, by which corners of the grid are inside and what crosses
+/// the edges along an axis from a corner.
+pub fn brick_at(
+    base: [usize; 3],
+    is_inside: impl Fn([usize; 3]) -> bool,
+    hit: impl Fn(usize, [usize; 3]) -> Hit,
+) -> SignBrick {
+    let mut corners = CornerBits::default();
+    for (row, bits) in corners.rows.iter_mut().enumerate() {
+        for x in 0..LINES {
+            let at = [base[0] + x, base[1] + row % LINES, base[2] + row / LINES];
+            *bits |= u64::from(is_inside(at)) << x;
+        }
+    }
+    let mut marks = EdgeBits::default();
+    marks.set_differences(&corners);
+    let base_inside = corners.get([0; 3]);
+    let mut brick = SignBrick { base_inside, ..SignBrick::default() };
+    marks.for_each(|edge| {
+        let (axis, at) = edge_position(edge);
+        let plane = match hit(axis, std::array::from_fn(|a| base[a] + at[a])) {
+            Hit::Patch(plane) => plane,
+            Hit::Plane(plane) => {
+                brick.planes.push(plane);
+                brick.planes.len() as u32 - 1
+            }
+        };
+        brick.crossings.push(Crossing { edge, plane });
+    });
+    brick
 }
 
 /// What came of a field.

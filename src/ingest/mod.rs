@@ -20,6 +20,7 @@ mod error;
 mod examine;
 mod facts;
 mod fins;
+mod kept;
 mod packed;
 mod rims;
 #[cfg(test)]
@@ -34,6 +35,7 @@ pub use crowds::LeftOut;
 pub use duplicates::{DROPS, SettleStats, Settled, settle};
 pub use error::IngestError;
 pub use fins::{FinStats, SheetRule, drop_fins};
+pub use kept::{KeptBin, KeptBins};
 pub use rims::Rims;
 pub use soup::{ATTRIBUTES, AttributeRecord, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use sums::{SoupSums, sum_up};

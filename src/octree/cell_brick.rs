@@ -118,15 +118,20 @@ impl ArchiveSize for CellBrick {
     }
 }
 
+/// Which of these clusters of a brick, ascending, covers a leaf cell.
+#[must_use]
+pub fn cluster_over(clusters: &[u32], cell: u32) -> Option<u32> {
+    let after = clusters.partition_point(|cluster| *cluster & 0x7fff <= cell);
+    let cluster = clusters[after.checked_sub(1)?];
+    let end = (cluster & 0x7fff) + (1 << (3 * (cluster >> 15 & 7)));
+    (cell < end).then_some(cluster)
+}
+
 impl CellBrick {
     /// Drops the reaches of leaf cells that a cluster covers.
     pub fn drop_covered_reaches(&mut self) {
         let clusters = &self.clusters;
-        self.reaches.retain(|reach| {
-            let after = clusters.partition_point(|c| *c & 0x7fff <= u32::from(reach.cell));
-            let covering = after.checked_sub(1).map(|at| clusters[at]);
-            covering.is_none_or(|c| (c & 0x7fff) + (1 << (3 * (c >> 15 & 7))) <= reach.cell.into())
-        });
+        self.reaches.retain(|reach| cluster_over(clusters, reach.cell.into()).is_none());
     }
 }
 
@@ -135,6 +140,13 @@ impl ArchivedCellBrick {
     #[must_use]
     pub fn to_brick(&self) -> CellBrick {
         rkyv::deserialize::<CellBrick, BoxedError>(self).expect("plain vectors deserialise")
+    }
+
+    /// Its vertices that may reach beyond their cells.
+    #[must_use]
+    pub fn to_reaches(&self) -> Vec<VertexReach> {
+        rkyv::deserialize::<Vec<VertexReach>, BoxedError>(&self.reaches)
+            .expect("plain vectors deserialise")
     }
 
     /// What larger clusters ask of it.

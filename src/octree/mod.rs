@@ -21,7 +21,7 @@ pub use brick::{
 };
 pub use cell_brick::{
     Above, ArchivedCellBrick, CellBrick, FacePoint, Facet, MAX_LEVEL, Summary, VertexReach,
-    decode_cells,
+    cluster_over, decode_cells,
 };
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{

@@ -7,13 +7,13 @@ use crate::contour::{
     write_surface,
 };
 use crate::ingest::{
-    BinEntry, Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, drop_fins,
-    fill_bins, read_soup, settle,
+    BinEntry, Bins, KeptBin, KeptBins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure,
+    drop_fins, fill_bins, read_soup, settle,
 };
 use crate::io::{ReadOptions, check_output};
 use crate::mesh::{SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
-use crate::octree::{BrickKey, Domain, DropRecord, Flips};
+use crate::octree::{BrickKey, Domain, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::choose::{Trials, most_trials};
@@ -25,7 +25,7 @@ use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
 use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
-use crate::store::{BrickFile, FileState, Resources, SpoolPeek, StoreError};
+use crate::store::{BrickFile, FileState, Resources, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
 
 /// A level of detail whose file is in its place.
@@ -396,9 +396,16 @@ fn scan_bins(
     let files = workspace.files();
     let bins = Bins::open(resources, &files, findings.left_out)?;
     let settled = Settled::open(resources, &files, findings.settle)?;
-    let mut items = ScanItems::new(&bins, &settled);
+    let mut kept = KeptBins::new(&bins, &settled);
+    let mut next = || {
+        let item = |KeptBin { entry: BinEntry { brick, first, count }, drops }| {
+            let brick = BrickKey(brick);
+            ScanItem { brick, first, count, drops }
+        };
+        Ok(kept.next_bin()?.map(item))
+    };
     let (triangles, drops) = (&bins.triangles, &settled.drops);
-    let (hits, stats) = scan(triangles, drops, || items.next(), findings.domain(), resources)?;
+    let (hits, stats) = scan(triangles, drops, &mut next, findings.domain(), resources)?;
     findings.scan = stats;
     Ok(hand_on(hits, &mut handles.hits))
 }
@@ -427,26 +434,4 @@ fn flood_bricks(
     let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
     let flooded = flood(hits, &flips, findings.domain(), resources).map_err(RepairError::Sign)?;
     Ok(flooded.files())
-}
-
-/// Walks bins and drops side by side.
-struct ScanItems<'b> {
-    bins: SpoolPeek<'b, BinEntry>,
-    drops: SpoolPeek<'b, DropRecord>,
-    next_drop: u64,
-}
-
-impl<'b> ScanItems<'b> {
-    fn new(bins: &'b Bins, settled: &'b Settled) -> Self {
-        let (bins, drops) = (SpoolPeek::new(&bins.entries), SpoolPeek::new(&settled.drops));
-        Self { bins, drops, next_drop: 0 }
-    }
-
-    fn next(&mut self) -> Result<Option<ScanItem>, StoreError> {
-        let Some(BinEntry { brick, first, count }) = self.bins.next()? else { return Ok(None) };
-        let first_drop = self.next_drop;
-        self.next_drop += self.drops.skip_while(|drop| drop.brick == brick)?;
-        let drops = first_drop..self.next_drop;
-        Ok(Some(ScanItem { brick: BrickKey(brick), first, count, drops }))
-    }
 }

@@ -93,7 +93,7 @@ pub fn turned_cube(random: &mut Random) -> (Vec<Corners>, DMat3, DVec3) {
     (transform(&cuboid([-1.0; 3], [1.0; 3]), turn, by), turn, by)
 }
 
-/// A prism over a convex profile in the plane of x and y, from z = `low` to `high`.
+/// A prism over a profile in the plane of x and y that is seen whole from its first corner, from z = `low` to `high`.
 pub fn prism(profile: &[[f64; 2]], low: f64, high: f64) -> Vec<Corners> {
     let at = |i: usize, z: f64| {
         let [x, y] = profile[i % profile.len()];

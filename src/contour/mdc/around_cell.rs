@@ -4,9 +4,11 @@
 //! Source: ours; see `separate`.
 
 use crate::contour::ContourError;
-use crate::contour::mdc::arcs::{Arc, Edge, Polygon, edges_of};
+use crate::contour::mdc::arcs::{Arc, Edge, edges_of};
+use crate::contour::mdc::around_edge::Polygon;
 use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
-use crate::contour::mdc::neighbourhood::{CutBox, Neighbourhood, Patch};
+use crate::contour::mdc::cut_cell::CutBox;
+use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};
 use crate::contour::mdc::shape::{Loop, LoopPoint, Shape};
 use crate::contour::mdc::triangulate::Quad;
 use crate::geom::triangle_triangle::Triangle;

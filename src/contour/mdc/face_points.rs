@@ -15,11 +15,10 @@ use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
 use crate::contour::mdc::far_points::FarPoints;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::Neighbourhood;
-use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, HAS_REACHES, flags_of};
+use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, HAS_GRANTED, flags_of};
 use crate::contour::{ContourError, ContourStats, SURFACE};
-use crate::monitor::{Gauge, Resident};
 use crate::octree::{Domain, FacePoint, encode};
-use crate::store::{BrickFile, BrickWriter, Resources, StoreError, ordered_by_weight};
+use crate::store::{BrickFile, BrickWriter, Resources};
 
 /// What a byte of a record takes while its face points are sought.
 const RECORD_FACTOR: u64 = 12;
@@ -36,21 +35,11 @@ pub fn add(
 ) -> Result<BrickFile, ContourError> {
     let far = FarPoints::find(layers, domain, resources)?;
     let mut writer = BrickWriter::create(resources.scratch, SURFACE, resources.backing)?;
-    let mut numbers = (0..layers.bricks())
-        .filter(|number| layers.is_anew(*number) || may_have_points(layers, *number));
-    let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    ordered_by_weight(
-        resources.pool,
-        resources.scales(|number: &usize| RECORD_FACTOR * layers.record_bytes(*number)),
-        || {
-            if resources.monitor.cancelled() {
-                return Err(ContourError::Store(StoreError::Cancelled));
-            }
-            Ok(numbers.next())
-        },
+    layers.each(
+        RECORD_FACTOR,
+        |number| layers.is_anew(number) || may_have_points(layers, number),
         || Neighbourhood::new(*layers, domain),
         |nb, number| {
-            let _brick = resident.hold(1);
             let mut points = face_points(nb, number)?;
             points.extend(far.of_brick(number));
             points.sort_unstable_by_key(|point| point.key);
@@ -70,6 +59,7 @@ pub fn add(
             stats.face_points += points;
             Ok(writer.append(key.0, flags, &bytes)?)
         },
+        resources,
     )?;
     Ok(writer.finish(resources.cached_windows)?)
 }
@@ -80,7 +70,7 @@ fn may_have_points(layers: &Layers, number: usize) -> bool {
     let below = (0..3).filter_map(|axis| layers.find(key.lower(1 << axis)?));
     std::iter::once(number)
         .chain(below)
-        .any(|number| layers.flags(number) & (HAS_CLUSTERS | HAS_FLAGGED | HAS_REACHES) != 0)
+        .any(|number| layers.flags(number) & (HAS_CLUSTERS | HAS_FLAGGED | HAS_GRANTED) != 0)
 }
 
 /// The face points that the brick owns, by ascending key.

@@ -17,7 +17,7 @@ use crate::contour::mdc::cell::{cell_number, edge_in_cell, place_of, segments_on
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::Neighbourhood;
 use crate::octree::{Domain, FacePoint, SIDE};
-use crate::store::{Resources, StoreError, ordered_by_weight};
+use crate::store::Resources;
 
 /// What a byte of a record takes while its face points are sought.
 const RECORD_FACTOR: u64 = 12;
@@ -44,24 +44,17 @@ impl FarPoints {
         domain: &Domain,
         resources: &Resources,
     ) -> Result<Self, ContourError> {
-        let is_in_above = |number: &usize| layers.flags(*number) & IS_IN_ABOVE != 0;
-        let mut numbers = (0..layers.bricks()).filter(is_in_above);
         let mut ends = Vec::new();
-        ordered_by_weight(
-            resources.pool,
-            resources.scales(|number: &usize| RECORD_FACTOR * layers.record_bytes(*number)),
-            || {
-                if resources.monitor.cancelled() {
-                    return Err(ContourError::Store(StoreError::Cancelled));
-                }
-                Ok(numbers.next())
-            },
+        layers.each(
+            RECORD_FACTOR,
+            |number| layers.flags(number) & IS_IN_ABOVE != 0,
             || Neighbourhood::new(*layers, domain),
             |nb, number| ends_in(nb, layers, number),
             |more: Vec<End>| {
                 ends.extend(more);
                 Ok(())
             },
+            resources,
         )?;
         ends.sort_unstable_by_key(|end| (end.owner, end.key, end.crossing));
         let mut points = Vec::with_capacity(ends.len() / 2);

@@ -15,11 +15,13 @@ use std::collections::HashMap;
 use std::ops::Range;
 
 use crate::contour::ContourError;
-use crate::contour::mdc::cell::{cell_number, number_at, place_of};
+use crate::contour::mdc::cell::{cell_number, components_of, number_at, place_of};
 use crate::contour::mdc::flags_of;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::look::Looked;
-use crate::octree::{ArchivedCellBrick, BrickKey, CellBrick, SIDE, VertexReach, encode};
+use crate::octree::{
+    ArchivedCellBrick, BrickKey, CellBrick, SIDE, VertexReach, cluster_over, encode,
+};
 
 /// What a brick tells of the cells that others may reach into.
 struct Ground {
@@ -32,31 +34,16 @@ struct Ground {
 impl Ground {
     fn new(number: usize, record: &ArchivedCellBrick) -> Self {
         let cells = record.cells.iter().map(|cell| cell_number(cell.to_native()) as u16);
-        let reaches = record.reaches.iter().map(|reach| VertexReach {
-            cell: reach.cell.to_native(),
-            face: reach.face,
-            is_granted: reach.is_granted,
-            far: reach.far.to_native(),
-            position: reach.position.map(|c| c.to_native()),
-        });
         Self {
             number,
             cells: cells.collect(),
             clusters: record.clusters.iter().map(|cluster| cluster.to_native()).collect(),
-            reaches: reaches.collect(),
+            reaches: record.to_reaches(),
         }
     }
 
     fn has_surface(&self, cell: usize) -> bool {
         self.cells.binary_search(&(cell as u16)).is_ok()
-    }
-
-    /// The cluster that covers a cell, without the number of its vertices.
-    fn cluster(&self, cell: usize) -> Option<u32> {
-        let after = self.clusters.partition_point(|c| (*c & 0x7fff) as usize <= cell);
-        let cluster = *self.clusters.get(after.checked_sub(1)?)?;
-        let end = (cluster & 0x7fff) + (1 << (3 * (cluster >> 15 & 7)));
-        ((cell as u32) < end).then_some(cluster & 0x3_ffff)
     }
 
     /// What the vertex of a cell wants beyond a face.
@@ -132,11 +119,11 @@ pub fn grant(
     number: usize,
 ) -> Result<Looked, ContourError> {
     let key = layers.key(number);
-    let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
+    let reaches = layers.read(number, |record| Ok(record.to_reaches()))?;
     let mut grounds = Grounds { layers, key, known: HashMap::new() };
     let mut banned = Vec::new();
     let mut granted = Vec::new();
-    for (at, reach) in brick.reaches.iter().enumerate().filter(|(_, reach)| !reach.is_granted) {
+    for (at, reach) in reaches.iter().enumerate().filter(|(_, reach)| !reach.is_granted) {
         let face = usize::from(reach.face);
         let place = beyond(place_of(usize::from(reach.cell)).map(|c| c as i32), face);
         if grounds.key_at(place).is_none_or(|key| is_within(key, covered)) {
@@ -146,8 +133,9 @@ pub fn grant(
             if ground.has_surface(cell) {
                 continue;
             }
-            if let Some(cluster) = ground.cluster(cell) {
-                banned.push((ground.number, cluster));
+            if let Some(cluster) = cluster_over(&ground.clusters, cell as u32) {
+                // Without the number of its vertices.
+                banned.push((ground.number, cluster & 0x3_ffff));
                 continue;
             }
         }
@@ -155,12 +143,14 @@ pub fn grant(
             granted.push(at);
         }
     }
-    for &at in &granted {
-        move_vertex(&mut brick, at);
-    }
-    let bytes = (layers.is_anew(number) || !granted.is_empty()).then(|| encode(&brick));
     let has_grown = !granted.is_empty();
-    Ok(Looked { number, key, flags: flags_of(&brick), bytes, has_grown, banned })
+    if !has_grown && !layers.is_anew(number) {
+        return Ok(Looked { number, key, flags: 0, bytes: None, has_grown, banned });
+    }
+    let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
+    move_vertices(&mut brick, &granted);
+    let (flags, bytes) = (flags_of(&brick), Some(encode(&brick)));
+    Ok(Looked { number, key, flags, bytes, has_grown, banned })
 }
 
 fn beyond(mut place: [i32; 3], face: usize) -> [i32; 3] {
@@ -168,36 +158,29 @@ fn beyond(mut place: [i32; 3], face: usize) -> [i32; 3] {
     place
 }
 
-/// Moves the vertex of reach number `at` to where it wants.
-fn move_vertex(brick: &mut CellBrick, at: usize) {
-    let reach = &mut brick.reaches[at];
-    reach.is_granted = true;
-    let (cell, position) = (usize::from(reach.cell), reach.position);
-    let vertex = vertex_of(brick, cell);
-    brick.positions[vertex] = position;
-}
-
-/// The first vertex of a leaf cell of the cut.
-fn vertex_of(brick: &CellBrick, cell: usize) -> usize {
-    let mut clusters = brick.clusters.iter().peekable();
+/// Moves the vertices of these reaches, by ascending number, to where they want.
+fn move_vertices(brick: &mut CellBrick, granted: &[usize]) {
+    let CellBrick { cells, clusters, reaches, positions, .. } = brick;
+    let mut granted = granted.iter().copied().peekable();
+    let mut clusters = clusters.iter().peekable();
     let (mut vertex, mut end) = (0, 0);
-    for &packed in &brick.cells {
+    for &packed in &*cells {
         let number = cell_number(packed);
-        if number >= cell {
-            break;
-        }
         if number < end {
             continue;
         }
-        match clusters.next_if(|cluster| (**cluster & 0x7fff) as usize <= number) {
-            Some(cluster) => {
-                end = (cluster & 0x7fff) as usize + (1 << (3 * (cluster >> 15 & 7)));
-                vertex += (cluster >> 18) as usize;
-            }
-            None => vertex += usize::from(crate::contour::mdc::cell::components_of(packed).count),
+        if let Some(cluster) = clusters.next_if(|c| (**c & 0x7fff) as usize <= number) {
+            end = (cluster & 0x7fff) as usize + (1 << (3 * (cluster >> 15 & 7)));
+            vertex += (cluster >> 18) as usize;
+            continue;
         }
+        if let Some(at) = granted.next_if(|at| usize::from(reaches[*at].cell) == number) {
+            reaches[at].is_granted = true;
+            positions[vertex] = reaches[at].position;
+        }
+        vertex += usize::from(components_of(packed).count);
     }
-    vertex
+    debug_assert!(granted.peek().is_none(), "reaches are of leaf cells of the cut");
 }
 
 /// Whether a key lies in one of these ranges.

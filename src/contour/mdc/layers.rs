@@ -1,8 +1,9 @@
 //! The bricks of cells, and behind them those that a later step has made anew.
 
 use crate::contour::ContourError;
+use crate::monitor::{Gauge, Resident};
 use crate::octree::{ArchivedCellBrick, BrickKey, decode_cells};
-use crate::store::{BrickFile, View};
+use crate::store::{BrickFile, Resources, StoreError, View, ordered_by_weight};
 
 /// Bricks of cells by the numbers that they have in the first file; a brick of the second file
 /// stands for the one of the first with its key.
@@ -76,5 +77,39 @@ impl<'f> Layers<'f> {
         let (file, number) = self.file_of(number);
         let view: View = file.view(number)?;
         use_it(decode_cells(&view)?)
+    }
+
+    /// Visits the bricks that are wanted on all threads, and takes what comes of them in their
+    /// order. A byte of a record takes `factor` bytes while it is visited.
+    ///
+    /// # Errors
+    /// The first error of `visit` or `take`, or that the caller cancels.
+    pub fn each<W, O: Send>(
+        &self,
+        factor: u64,
+        is_wanted: impl Fn(usize) -> bool,
+        workspace: impl Fn() -> W + Sync,
+        visit: impl Fn(&mut W, usize) -> Result<O, ContourError> + Sync,
+        take: impl FnMut(O) -> Result<(), ContourError>,
+        resources: &Resources,
+    ) -> Result<(), ContourError> {
+        let mut numbers = (0..self.bricks()).filter(|number| is_wanted(*number));
+        let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
+        ordered_by_weight(
+            resources.pool,
+            resources.scales(|number: &usize| factor * self.record_bytes(*number)),
+            || {
+                if resources.monitor.cancelled() {
+                    return Err(ContourError::Store(StoreError::Cancelled));
+                }
+                Ok(numbers.next())
+            },
+            workspace,
+            |space, number| {
+                let _brick = resident.hold(1);
+                visit(space, number)
+            },
+            take,
+        )
     }
 }

@@ -13,8 +13,10 @@ mod above;
 mod angles;
 mod arcs;
 mod around_cell;
+mod around_edge;
 mod cell;
 mod cluster;
+mod cut_cell;
 mod face_points;
 mod far_points;
 mod features;
@@ -30,6 +32,7 @@ mod reach;
 mod separate;
 mod shape;
 mod triangulate;
+mod two_sided;
 mod vertices;
 
 pub use layers::Layers;
@@ -57,6 +60,8 @@ const HAS_SUMMARY: u32 = 1 << 28;
 const IS_IN_ABOVE: u32 = 1 << 27;
 /// In the flags of a brick of cells: vertices may reach beyond their cells.
 const HAS_REACHES: u32 = 1 << 26;
+/// In the flags of a brick of cells: vertices do.
+const HAS_GRANTED: u32 = 1 << 25;
 
 /// What the directory says of a brick of cells.
 fn flags_of(brick: &CellBrick) -> u32 {
@@ -66,6 +71,7 @@ fn flags_of(brick: &CellBrick) -> u32 {
         | if multi { HAS_MULTI } else { 0 }
         | if brick.clusters.is_empty() { 0 } else { HAS_CLUSTERS }
         | if brick.reaches.is_empty() { 0 } else { HAS_REACHES }
+        | if brick.reaches.iter().any(|reach| reach.is_granted) { HAS_GRANTED } else { 0 }
         | if brick.flagged.is_empty() { 0 } else { HAS_FLAGGED }
         | if brick.summary.is_some() { HAS_SUMMARY } else { 0 }
         | if brick.above.is_some() { IS_IN_ABOVE } else { 0 }

@@ -6,11 +6,10 @@
 //! Fails:      [`ContourError::Contradiction`] where sound bricks have a cell and these do not.
 
 use crate::contour::ContourError;
-use crate::contour::mdc::cell::{
-    cell_mask, cell_number, components_of, edge_in_cell, number_at, place_of,
-};
+use crate::contour::mdc::cell::{cell_mask, cell_number, components_of, edge_in_cell, number_at};
+use crate::contour::mdc::cut_cell::{CutBox, steps_of};
 use crate::contour::mdc::layers::Layers;
-use crate::contour::mdc::loaded::{CutCell, Loaded, Vertex};
+use crate::contour::mdc::loaded::{Loaded, Vertex};
 use crate::contour::mdc::table::is_marked;
 use crate::octree::{BrickKey, Domain, SIDE};
 
@@ -62,53 +61,6 @@ impl Patch {
     pub fn cut_box(&self) -> CutBox {
         CutBox::new(self.slot, self.vertex.cut)
     }
-}
-
-/// A cell of the cut as a box.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct CutBox {
-    /// Its low corner, in cells.
-    pub low: [i32; 3],
-    /// Its high corner.
-    pub high: [i32; 3],
-}
-
-impl CutBox {
-    /// The box of a cell of the cut in the brick in slot `slot`.
-    pub fn new(slot: usize, cut: CutCell) -> Self {
-        let place = place_of(cut.first());
-        let steps = steps_of(slot);
-        let brick = cut.brick_in_it();
-        let mut low: [i32; 3] =
-            std::array::from_fn(|a| place[a] as i32 + (steps[a] - brick[a]) * SIDE as i32);
-        let mut high = low.map(|c| c + (1 << cut.level()));
-        if let Some(face) = cut.reaches() {
-            if face % 2 == 1 {
-                high[face / 2] += 1;
-            } else {
-                low[face / 2] -= 1;
-            }
-        }
-        Self { low, high }
-    }
-
-    /// The same box, moved.
-    pub fn moved(self, by: [i32; 3]) -> Self {
-        let add = |end: [i32; 3]| std::array::from_fn(|a| end[a] + by[a]);
-        Self { low: add(self.low), high: add(self.high) }
-    }
-
-    /// Whether a leaf cell lies in it.
-    #[inline]
-    pub fn holds(&self, cell: [i32; 3]) -> bool {
-        (0..3).all(|a| (self.low[a]..self.high[a]).contains(&cell[a]))
-    }
-}
-
-/// How many bricks away slot `slot` lies along each axis.
-#[inline]
-pub const fn steps_of(slot: usize) -> [i32; 3] {
-    [slot as i32 % 3 - 1, slot as i32 / 3 % 3 - 1, slot as i32 / 9 - 1]
 }
 
 /// The brick in slot `slot` around `key`; `None` below the grid.

@@ -4,7 +4,8 @@
 //! lie in the brick and its seven lower neighbours, all of which come earlier in Morton order.
 
 use crate::contour::mdc::angles::Angles;
-use crate::contour::mdc::arcs::{Edge, Polygon};
+use crate::contour::mdc::arcs::Edge;
+use crate::contour::mdc::around_edge::Polygon;
 use crate::contour::mdc::cell::{cell_mask, cell_number, place_of};
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};

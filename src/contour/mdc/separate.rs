@@ -26,11 +26,8 @@ use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
 use crate::contour::mdc::vertices::Workspace;
 use crate::contour::mdc::{HAS_MULTI, HAS_REACHES, above, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
-use crate::monitor::{Gauge, Resident};
 use crate::octree::{BrickKey, Domain, encode};
-use crate::store::{
-    BrickFile, BrickWriter, Resources, StoreError, directory_name, ordered_by_weight,
-};
+use crate::store::{BrickFile, BrickWriter, Resources, directory_name};
 
 /// What a byte of a record takes while it is looked at, with the sides of those around.
 const RECORD_FACTOR: u64 = 12;
@@ -170,23 +167,11 @@ impl Separation<'_> {
         let name = state.next_name();
         let mut writer = BrickWriter::create(resources.scratch, name, resources.backing)?;
         let mut found = Found::default();
-        let mut numbers = (0..layers.bricks())
-            .filter(|number| layers.is_anew(*number) || is_wanted(&layers, *number));
-        let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
-        ordered_by_weight(
-            resources.pool,
-            resources.scales(|number: &usize| RECORD_FACTOR * layers.record_bytes(*number)),
-            || {
-                if resources.monitor.cancelled() {
-                    return Err(ContourError::Store(StoreError::Cancelled));
-                }
-                Ok(numbers.next())
-            },
+        layers.each(
+            RECORD_FACTOR,
+            |number| layers.is_anew(number) || is_wanted(&layers, number),
             || Neighbourhood::new(layers, self.domain),
-            |nb, number| {
-                let _brick = resident.hold(1);
-                visit(nb, number)
-            },
+            visit,
             |looked: Looked| {
                 if let Some(bytes) = &looked.bytes {
                     writer.append(looked.key.0, looked.flags, bytes)?;
@@ -197,6 +182,7 @@ impl Separation<'_> {
                 found.banned.extend(looked.banned);
                 Ok(())
             },
+            resources,
         )?;
         state.put(writer.finish(resources.cached_windows)?);
         Ok(found)

@@ -13,7 +13,6 @@ use crate::contour::mdc::cell::{FLIPPED_BIT, JOINED_BIT, components_of, number_a
 use crate::contour::mdc::cluster::{ClusterOptions, Clustering, Leaves};
 use crate::contour::mdc::features::{Halo, Place};
 use crate::contour::mdc::leaf_vertex::WaitingCells;
-use crate::contour::mdc::table::{NO_FACE, TWO_SIDED};
 use crate::contour::mdc::{INSET_UNITS, flags_of};
 use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method};
 use crate::geom::qef::QefOptions;
@@ -131,7 +130,7 @@ pub struct Workspace {
     pub(super) is_smooth: bool,
     pub(super) halo: Halo,
     /// Corner signs of bricks beyond a side, for faces that two bricks must agree on.
-    beyond: HashMap<u64, CornerBits>,
+    pub(super) beyond: HashMap<u64, CornerBits>,
 }
 
 /// How the vertices of cells and of clusters are placed.
@@ -333,57 +332,5 @@ impl Workspace {
         stats.multi_cells += u64::from(components.count > 1);
         stats.cell_vertices += u64::from(components.count);
         Ok(())
-    }
-
-    /// Whether one component touches an ambiguous face twice, and so does one of the cell beyond.
-    fn is_flipped(
-        &mut self,
-        signs: &BrickFile,
-        key: BrickKey,
-        at: [usize; 3],
-        mask: u8,
-    ) -> Result<bool, ContourError> {
-        let face = TWO_SIDED[usize::from(mask)];
-        if face == NO_FACE {
-            return Ok(false);
-        }
-        let (axis, high) = (usize::from(face / 2), face % 2 == 1);
-        let mut cell = at;
-        let inside = if high { at[axis] + 1 < SIDE } else { at[axis] > 0 };
-        let other = if inside {
-            cell[axis] = if high { at[axis] + 1 } else { at[axis] - 1 };
-            self.signs.cell_mask(cell)
-        } else {
-            cell[axis] = if high { 0 } else { SIDE - 1 };
-            let neighbour = if high { Some(key.upper(axis)) } else { key.lower(1 << axis) };
-            self.mask_beyond(signs, key, neighbour, cell)?
-        };
-        Ok(TWO_SIDED[usize::from(other)] == face ^ 1)
-    }
-
-    fn mask_beyond(
-        &mut self,
-        signs: &BrickFile,
-        key: BrickKey,
-        neighbour: Option<BrickKey>,
-        cell: [usize; 3],
-    ) -> Result<u8, ContourError> {
-        let missing = || ContourError::Contradiction {
-            brick: key.position(),
-            expected: "a brick beyond a crossed side",
-        };
-        let neighbour = neighbour.ok_or_else(missing)?;
-        if let Some(corners) = self.beyond.get(&neighbour.0) {
-            return Ok(corners.cell_mask(cell));
-        }
-        let view = signs.view(signs.find(neighbour.0).ok_or_else(missing)?)?;
-        let record = decode_signs(&view)?;
-        let mut marks = EdgeBits::default();
-        record.crossings.iter().for_each(|crossing| marks.set(crossing.edge.to_native()));
-        let mut corners = CornerBits::default();
-        corners.from_marks(&marks, record.base_inside);
-        let mask = corners.cell_mask(cell);
-        self.beyond.insert(neighbour.0, corners);
-        Ok(mask)
     }
 }

@@ -4,16 +4,15 @@
 //! Out:     [`Pair`]s of triangles on an edge of two; [`BorderUse`]s of all other edges.
 //! Memory:  the share of a worker.
 
-use std::ops::Range;
-
 use bytemuck::{Pod, Zeroable};
 
-use crate::ingest::bins::{BinEntry, Bins};
+use crate::ingest::bins::Bins;
 use crate::ingest::duplicates::Settled;
 use crate::ingest::examine::owner;
 use crate::ingest::facts::Outbox;
+use crate::ingest::kept::KeptBin;
 use crate::ingest::packed::{pack_ends, snapped};
-use crate::octree::{Domain, SoupTriangle};
+use crate::octree::Domain;
 use crate::store::{Record, Scratch, Sorter, StoreError};
 
 /// Two triangles that share an edge with no third.
@@ -49,44 +48,6 @@ impl Record for BorderUse {
     }
 }
 
-/// Visits the triangles of a bin without its drops, which are sorted alike.
-pub fn each_kept(
-    bins: &Bins,
-    settled: &Settled,
-    entry: BinEntry,
-    drops: Range<u64>,
-    mut visit: impl FnMut(&SoupTriangle) -> Result<(), StoreError>,
-) -> Result<(), StoreError> {
-    let mut dropped = Vec::new();
-    let mut next_drop = drops.start;
-    let mut at = 0;
-    let mut reader = bins.triangles.reader(entry.first, entry.count);
-    while let Some(block) = reader.next_block()? {
-        for triangle in block {
-            while next_drop < drops.end || at < dropped.len() {
-                if at == dropped.len() {
-                    let most = (drops.end - next_drop).min(MOST_DROPS);
-                    settled.drops.read(next_drop, most as usize, &mut dropped)?;
-                    next_drop += dropped.len() as u64;
-                    at = 0;
-                }
-                if dropped[at].source >= triangle.source {
-                    break;
-                }
-                at += 1;
-            }
-            let is_dropped = dropped.get(at).is_some_and(|drop| drop.source == triangle.source);
-            if !is_dropped {
-                visit(triangle)?;
-            }
-        }
-    }
-    Ok(())
-}
-
-/// Drops that are read at a time.
-const MOST_DROPS: u64 = 1024;
-
 /// Finds the edges of one bin after another.
 pub struct EdgeFinder<'f> {
     pub bins: &'f Bins,
@@ -100,10 +61,10 @@ pub struct EdgeFinder<'f> {
 
 impl EdgeFinder<'_> {
     /// Finds those of one bin.
-    pub fn find(&mut self, entry: BinEntry, drops: Range<u64>) -> Result<(), StoreError> {
+    pub fn find(&mut self, bin: &KeptBin) -> Result<(), StoreError> {
         let mut uses = Sorter::<BorderUse>::new(self.scratch, self.share_bytes);
         let domain = self.domain;
-        each_kept(self.bins, self.settled, entry, drops, |triangle| {
+        bin.each(self.bins, self.settled, |triangle| {
             let corners = snapped(domain, triangle);
             if (0..3).any(|i| corners[i] == corners[(i + 1) % 3]) {
                 return Ok(());
@@ -111,7 +72,7 @@ impl EdgeFinder<'_> {
             for i in 0..3 {
                 let (a, b) = (corners[i], corners[(i + 1) % 3]);
                 let ends = [a.min(b), a.max(b)];
-                if owner(domain, ends[0]) == entry.brick {
+                if owner(domain, ends[0]) == bin.entry.brick {
                     let (ends, source) = (pack_ends(ends), triangle.source);
                     uses.push(BorderUse { ends, source, unused: 0 })?;
                 }

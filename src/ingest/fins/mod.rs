@@ -8,7 +8,8 @@
 //!
 //! In:         bins, and what is settled about copies in them.
 //! Out:        [`Settled`] with the triangles of fins among the drops.
-//! Invariant:  the answer depends on the triangles alone, not on their order or on any share.
+//! Invariant:  the answer does not depend on any share or thread; on the order of the triangles
+//!             only by the rounding of areas and lengths.
 //! Units:      lattice units; areas and lengths in model units.
 //! Memory:     the share; tables over all triangles, only where the soup is open.
 //! Fails:      [`StoreError`].
@@ -21,13 +22,14 @@ use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
-use crate::ingest::bins::{BinEntry, Bins};
+use crate::ingest::bins::Bins;
 use crate::ingest::duplicates::{DROPS, SettleStats, Settled};
 use crate::ingest::facts::Outbox;
 use crate::ingest::fins::edges::{BorderUse, EdgeFinder, Pair};
 use crate::ingest::fins::parts::Parts;
+use crate::ingest::kept::KeptBins;
 use crate::octree::{Domain, DropRecord};
-use crate::store::{Resources, Sorter, SpoolPeek, SpoolWriter, StoreError, Unite, ordered};
+use crate::store::{Resources, Sorter, SpoolWriter, StoreError, Unite, ordered};
 
 /// What becomes of sheets without thickness.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -84,18 +86,22 @@ pub fn drop_fins(
     let unit = domain.cell_size() / f64::from(domain.cell_units);
     let mut parts = Parts::new(sheets.finish()?, unit, resources)?;
     parts.take_borders(borders)?;
-    if !parts.may_have_fins(rule) {
+    if !parts.may_have_fins(rule)? {
+        parts.end()?;
         return Ok(settled);
     }
-    let mut walk = Kept::new(bins, &settled);
-    while let Some(entry) = walk.next_bin()? {
-        walk.each(entry, |triangle| parts.add_area(triangle, domain, entry.brick))?;
+    let mut kept = KeptBins::new(bins, &settled);
+    while let Some(bin) = kept.next_bin()? {
+        let brick = bin.entry.brick;
+        bin.each(bins, &settled, |triangle| parts.add_area(triangle, domain, brick))?;
     }
     let stats = parts.decide(rule, area)?;
     if stats.triangles == 0 {
+        parts.end()?;
         return Ok(settled);
     }
     let drops = all_drops(bins, &settled, &mut parts, resources)?;
+    parts.end()?;
     let stats = SettleStats { fins: stats, ..settled.stats };
     drop(settled);
     let mut spool = SpoolWriter::create(resources.scratch, DROPS)?;
@@ -118,20 +124,20 @@ fn find_edges(
     let share_bytes = resources.share_bytes / 2 / workers / SORTS;
     let pairs = Mutex::new(Sorter::new(scratch, resources.share_bytes / 8));
     let borders = Mutex::new(Sorter::new(scratch, resources.share_bytes / 8));
-    let mut walk = Kept::new(bins, settled);
+    let mut kept = KeptBins::new(bins, settled);
     ordered(
         resources.pool,
         || {
             if resources.monitor.cancelled() {
                 return Err(StoreError::Cancelled);
             }
-            Ok(walk.next_bin()?.map(|entry| (entry, walk.drops_here.clone())))
+            kept.next_bin()
         },
         || {
             let (pairs, borders) = (Outbox::new(&pairs), Outbox::new(&borders));
             EdgeFinder { bins, settled, domain, scratch, share_bytes, pairs, borders }
         },
-        |finder, (entry, drops)| finder.find(entry, drops),
+        |finder, bin| finder.find(&bin),
         |()| Ok(()),
     )?;
     let pairs = pairs.into_inner().unwrap_or_else(PoisonError::into_inner);
@@ -150,49 +156,15 @@ fn all_drops(
     while let Some(block) = reader.next_block()? {
         drops.extend(block)?;
     }
-    let mut walk = Kept::new(bins, settled);
-    while let Some(entry) = walk.next_bin()? {
-        walk.each(entry, |triangle| {
+    let mut kept = KeptBins::new(bins, settled);
+    while let Some(bin) = kept.next_bin()? {
+        bin.each(bins, settled, |triangle| {
             if parts.goes(triangle.source)? {
-                let brick = entry.brick;
+                let brick = bin.entry.brick;
                 drops.push(DropRecord { brick, source: triangle.source, unused: 0 })?;
             }
             Ok(())
         })?;
     }
     Ok(drops)
-}
-
-/// Walks the bins with the drops of each.
-struct Kept<'k> {
-    bins: &'k Bins,
-    settled: &'k Settled,
-    entries: SpoolPeek<'k, BinEntry>,
-    drops: SpoolPeek<'k, DropRecord>,
-    next_drop: u64,
-    drops_here: std::ops::Range<u64>,
-}
-
-impl<'k> Kept<'k> {
-    fn new(bins: &'k Bins, settled: &'k Settled) -> Self {
-        let (entries, drops) = (SpoolPeek::new(&bins.entries), SpoolPeek::new(&settled.drops));
-        Self { bins, settled, entries, drops, next_drop: 0, drops_here: 0..0 }
-    }
-
-    fn next_bin(&mut self) -> Result<Option<BinEntry>, StoreError> {
-        let Some(entry) = self.entries.next()? else { return Ok(None) };
-        let first = self.next_drop;
-        self.next_drop += self.drops.skip_while(|drop| drop.brick == entry.brick)?;
-        self.drops_here = first..self.next_drop;
-        Ok(Some(entry))
-    }
-
-    /// The triangles of the bin that [`Kept::next_bin`] told last, without drops.
-    fn each(
-        &self,
-        entry: BinEntry,
-        visit: impl FnMut(&crate::octree::SoupTriangle) -> Result<(), StoreError>,
-    ) -> Result<(), StoreError> {
-        edges::each_kept(self.bins, self.settled, entry, self.drops_here.clone(), visit)
-    }
 }

@@ -1,6 +1,6 @@
 //! The sheets of a soup: how large and flat each is, and how it is held; which of them go.
 //!
-//! Memory:  88 bytes a triangle in tables that spill.
+//! Memory:  8 bytes a triangle and 80 a sheet that has a border, in tables that spill.
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -11,7 +11,7 @@ use crate::ingest::fins::edges::BorderUse;
 use crate::ingest::fins::{FinStats, SheetRule};
 use crate::ingest::packed::{snapped, unpack_ends};
 use crate::octree::{Domain, SoupTriangle};
-use crate::store::{Labels, Resources, Sorter, Spool, SpoolWriter, StoreError, Table};
+use crate::store::{Labels, Resources, Scratch, Sorter, Spool, SpoolWriter, StoreError, Table};
 
 /// Share of the squared area that the squared moments of the normals make up in a flat sheet: all
 /// of it in a plane, half in the walls of a box or a tube.
@@ -29,7 +29,7 @@ const MOST_USES: usize = 64;
 /// Spool of the borders of sheets.
 const BORDERS: &str = "borders.spool";
 
-/// What is known of a sheet, under the number of its first triangle.
+/// What is known of a sheet that has a border.
 #[derive(Clone, Copy, Default, Pod, Zeroable)]
 #[repr(C)]
 struct Sheet {
@@ -55,48 +55,49 @@ impl Sheet {
         squares >= FLAT_SHARE * self.area * self.area
     }
 
+    /// Whether its borders allow that it goes.
+    fn may_be_taken_out(&self, rule: SheetRule) -> bool {
+        let hangs = 0.0 < self.held && self.held < self.open;
+        let is_free = self.held == 0.0 && self.open > 0.0;
+        self.state & STAYS == 0 && (hangs || is_free && rule == SheetRule::Remove)
+    }
+
+    /// Whether it goes unless that opens something.
     fn may_go(&self, rule: SheetRule, total_area: f64) -> bool {
-        if self.state & STAYS != 0 || self.open == 0.0 || !self.is_flat() {
-            return false;
-        }
-        if self.held == 0.0 {
-            return rule == SheetRule::Remove;
-        }
         let is_small =
             self.area <= MOST_AREA_SHARE * total_area && self.triangles <= MOST_TRIANGLES;
-        is_small && self.held < self.open
+        self.may_be_taken_out(rule) && self.is_flat() && (is_small || self.held == 0.0)
     }
 }
 
 /// See the module.
 pub struct Parts {
     labels: Labels,
+    /// Of each label one more than the number of its sheet; 0 if that has no border.
+    numbers: Table<u32>,
     sheets: Table<Sheet>,
     unit: f64,
     /// By edge.
     borders: Option<Spool<BorderUse>>,
-    scratch: crate::store::Scratch,
-    is_any_held: bool,
-    is_any_open: bool,
+    scratch: Scratch,
 }
 
 impl Parts {
     /// Sheets whose triangles have these labels.
     pub fn new(labels: Labels, unit: f64, resources: &Resources) -> Result<Self, StoreError> {
-        let mut sheets = Table::new(resources.scratch, resources.share_bytes / 4);
+        let (scratch, share_bytes) = (resources.scratch, resources.share_bytes / 8);
+        let mut numbers = Table::new(scratch, share_bytes);
         for _ in 0..labels.len() {
-            sheets.push(Sheet::default())?;
+            numbers.push(0)?;
         }
-        let scratch = resources.scratch.clone();
-        Ok(Self {
-            labels,
-            sheets,
-            unit,
-            borders: None,
-            scratch,
-            is_any_held: false,
-            is_any_open: false,
-        })
+        let sheets = Table::new(scratch, share_bytes);
+        Ok(Self { labels, numbers, sheets, unit, borders: None, scratch: scratch.clone() })
+    }
+
+    /// Removes its files that have names.
+    pub fn end(&mut self) -> Result<(), StoreError> {
+        self.borders = None;
+        self.scratch.remove(BORDERS)
     }
 
     /// Takes in where sheets are open, and where they are held.
@@ -112,42 +113,62 @@ impl Parts {
         Ok(())
     }
 
+    /// The sheet of a triangle; `None` if it has no border.
+    fn sheet_of(&mut self, source: u32) -> Result<Option<u64>, StoreError> {
+        let label = self.labels.label(source)?;
+        Ok(self.numbers.get(u64::from(label))?.checked_sub(1).map(u64::from))
+    }
+
+    /// The sheet of a triangle on a border, which is entered when it is met first.
+    fn enter(&mut self, source: u32) -> Result<u64, StoreError> {
+        let label = u64::from(self.labels.label(source)?);
+        if let Some(known) = self.numbers.get(label)?.checked_sub(1) {
+            return Ok(u64::from(known));
+        }
+        self.sheets.push(Sheet::default())?;
+        let number = self.sheets.len();
+        self.numbers.set(label, number as u32)?;
+        Ok(number - 1)
+    }
+
     fn take_edge(&mut self, uses: &[BorderUse]) -> Result<(), StoreError> {
         let length = length_of(unpack_ends(uses[0].ends), self.unit);
         let sheets = self.sheets_of(uses)?;
         let is_crowded = uses.len() == MOST_USES;
-        for (i, &label) in sheets.iter().enumerate() {
-            let mut sheet = self.sheets.get(u64::from(label))?;
+        for (i, &number) in sheets.iter().enumerate() {
+            let mut sheet = self.sheets.get(number)?;
+            let is_twice = sheets.get(i + 1) == Some(&number) || i > 0 && sheets[i - 1] == number;
             if uses.len() == 1 {
                 sheet.open += length;
-                self.is_any_open = true;
-            } else if is_crowded
-                || sheets.get(i + 1) == Some(&label)
-                || i > 0 && sheets[i - 1] == label
-            {
+            } else if is_crowded || is_twice {
                 sheet.state |= STAYS;
             } else {
                 sheet.held += length;
-                self.is_any_held = true;
             }
-            self.sheets.set(u64::from(label), sheet)?;
+            self.sheets.set(number, sheet)?;
         }
         Ok(())
     }
 
     /// The sheet of every use, sorted.
-    fn sheets_of(&mut self, uses: &[BorderUse]) -> Result<Vec<u32>, StoreError> {
-        let mut labels = Vec::with_capacity(uses.len());
+    fn sheets_of(&mut self, uses: &[BorderUse]) -> Result<Vec<u64>, StoreError> {
+        let mut sheets = Vec::with_capacity(uses.len());
         for border in uses {
-            labels.push(self.labels.label(border.source)?);
+            sheets.push(self.enter(border.source)?);
         }
-        labels.sort_unstable();
-        Ok(labels)
+        sheets.sort_unstable();
+        Ok(sheets)
     }
 
     /// Whether the borders leave room for a sheet to go.
-    pub fn may_have_fins(&self, rule: SheetRule) -> bool {
-        self.is_any_open && (self.is_any_held || rule == SheetRule::Remove)
+    pub fn may_have_fins(&mut self, rule: SheetRule) -> Result<bool, StoreError> {
+        for number in 0..self.sheets.len() {
+            let sheet = self.sheets.get(number)?;
+            if sheet.may_be_taken_out(rule) {
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Adds a triangle to its sheet, in the brick that owns its lowest corner.
@@ -161,11 +182,8 @@ impl Parts {
         if owner(domain, lowest) != brick {
             return Ok(());
         }
-        let label = u64::from(self.labels.label(triangle.source)?);
-        let mut sheet = self.sheets.get(label)?;
-        if sheet.open == 0.0 {
-            return Ok(());
-        }
+        let Some(number) = self.sheet_of(triangle.source)? else { return Ok(()) };
+        let mut sheet = self.sheets.get(number)?;
         let [p, q, r] = triangle.corners.map(DVec3::from);
         let cross = (q - p).cross(r - p);
         let area = 0.5 * cross.length();
@@ -178,22 +196,22 @@ impl Parts {
             sheet.area += area;
         }
         sheet.triangles += 1;
-        self.sheets.set(label, sheet)
+        self.sheets.set(number, sheet)
     }
 
     /// Decides which sheets go; nothing else may open by it.
     pub fn decide(&mut self, rule: SheetRule, total_area: f64) -> Result<FinStats, StoreError> {
-        for label in 0..self.sheets.len() {
-            let mut sheet = self.sheets.get(label)?;
+        for number in 0..self.sheets.len() {
+            let mut sheet = self.sheets.get(number)?;
             if sheet.may_go(rule, total_area) {
                 sheet.state |= MAY_GO;
-                self.sheets.set(label, sheet)?;
+                self.sheets.set(number, sheet)?;
             }
         }
         while self.keep_what_would_open()? {}
         let mut stats = FinStats::default();
-        for label in 0..self.sheets.len() {
-            let sheet = self.sheets.get(label)?;
+        for number in 0..self.sheets.len() {
+            let sheet = self.sheets.get(number)?;
             if sheet.state & MAY_GO != 0 {
                 stats.fins += u64::from(sheet.held > 0.0);
                 stats.free_sheets += u64::from(sheet.held == 0.0);
@@ -221,27 +239,27 @@ impl Parts {
             return Ok(false);
         }
         let mut going = Vec::new();
-        for label in self.sheets_of(uses)? {
-            if self.sheets.get(u64::from(label))?.state & MAY_GO != 0 {
-                going.push(label);
+        for number in self.sheets_of(uses)? {
+            if self.sheets.get(number)?.state & MAY_GO != 0 {
+                going.push(number);
             }
         }
         let left = uses.len() - going.len();
         if going.is_empty() || left > 0 && left.is_multiple_of(2) {
             return Ok(false);
         }
-        for label in going {
-            let mut sheet = self.sheets.get(u64::from(label))?;
+        for number in going {
+            let mut sheet = self.sheets.get(number)?;
             sheet.state &= !MAY_GO;
-            self.sheets.set(u64::from(label), sheet)?;
+            self.sheets.set(number, sheet)?;
         }
         Ok(true)
     }
 
     /// Whether a triangle's sheet goes.
     pub fn goes(&mut self, source: u32) -> Result<bool, StoreError> {
-        let label = self.labels.label(source)?;
-        Ok(self.sheets.get(u64::from(label))?.state & MAY_GO != 0)
+        let Some(number) = self.sheet_of(source)? else { return Ok(false) };
+        Ok(self.sheets.get(number)?.state & MAY_GO != 0)
     }
 }
 

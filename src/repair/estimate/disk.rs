@@ -29,6 +29,14 @@ pub const SMALL_BIN: f64 = 32_768.0;
 const CROWDED: f64 = 50.0;
 /// Edges of a triangle in that sort.
 const EDGE_SORT_BYTES: f64 = 96.0;
+/// A triangle on the border of a sheet, and at most so many of them for an edge of a rim.
+const BORDER_BYTES: f64 = 32.0;
+const BORDERS_PER_RIM: f64 = 4.0;
+/// Pairs of triangles on an edge of two, of each triangle at most three halves.
+const JOINT_BYTES: f64 = 12.0;
+/// A triangle's label, and a sheet.
+const LABEL_BYTES: f64 = 4.0;
+const SHEET_BYTES: f64 = 80.0;
 /// Records of bricks: what an edge, a kept hit, a plane, a crossing and a vertex take.
 const HIT_EDGE_BYTES: f64 = 8.0;
 const KEPT_HIT_BYTES: f64 = 4.0;
@@ -155,7 +163,11 @@ impl DiskModel<'_> {
         DiskSteps {
             read: (kept + soup + self.reader_bytes as f64) as u64,
             bin: (kept + soup + bins + runs) as u64,
-            settle: (kept + soup + bins + drops + self.edge_sorts(pairs)) as u64,
+            settle: (kept
+                + soup
+                + bins
+                + drops
+                + self.edge_sorts(pairs).max(self.fins(pairs, drops))) as u64,
             scan: (kept + bins + drops + hits) as u64,
             patch: (kept + bins + drops + hits + faces + 2.0 * flips) as u64,
             flood: (kept + hits + flips + regions) as u64,
@@ -229,6 +241,25 @@ impl DiskModel<'_> {
         let threads = self.plan.threads as f64;
         let share = self.plan.share_bytes as f64 / 6.0 / threads;
         pairs.min(threads * largest) / largest * spilled(EDGE_SORT_BYTES * largest, 0.0, share)
+    }
+
+    /// What is written while fins are sought, where the soup is open.
+    fn fins(&self, pairs: f64, drops: f64) -> f64 {
+        let triangles = self.sums.finite_triangles() as f64;
+        // On edges of one triangle, and on those of three and more beside them.
+        let borders = BORDER_BYTES * (BORDERS_PER_RIM * self.sums.rims.edges).min(3.0 * triangles);
+        if borders == 0.0 {
+            return 0.0;
+        }
+        let (largest, threads) = (self.largest_bin(), self.plan.threads as f64);
+        let share = self.plan.share_bytes as f64;
+        let edges = spilled(EDGE_SORT_BYTES * largest, 0.0, share / 8.0 / threads);
+        let sorts = pairs.min(threads * largest) / largest.max(1.0) * edges
+            + spilled(JOINT_BYTES * triangles, 0.0, share / 8.0)
+            + spilled(borders, 0.0, share / 8.0);
+        let labels = spilled(LABEL_BYTES * triangles, 0.0, share / 8.0);
+        let sheets = spilled(SHEET_BYTES * triangles.min(borders / BORDER_BYTES), 0.0, share / 8.0);
+        sorts + borders + 3.0 * labels + sheets + 2.0 * drops
     }
 
     /// What the proof and the reader of the written file spill.

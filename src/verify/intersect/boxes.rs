@@ -45,10 +45,4 @@ impl NearBox {
         let starts = pack(starts.map(u32::from)) << PLACE_BITS;
         Self { low: pack(low), high: pack(high), starts }
     }
-    /// Whether two boxes overlap, and the overlap starts in the cell.
-    #[inline]
-    pub(crate) fn overlaps(&self, other: &Self) -> bool {
-        let overlap = not_below(self.high, other.low) & not_below(other.high, self.low);
-        overlap & (self.starts | other.starts) == SPARE
-    }
 }

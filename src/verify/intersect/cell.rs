@@ -6,12 +6,13 @@
 
 use crate::store::StoreError;
 use crate::verify::intersect::arrival::Unpacked;
+use crate::verify::intersect::boxes::NearBox;
 use crate::verify::intersect::boxes::PLACE_BITS;
 use crate::verify::intersect::filters::Normal;
 use crate::verify::intersect::flat_fans::{FlatCorners, FlatFans};
 use crate::verify::intersect::grid::{Grid, box_of, cell_of_key, extent_of};
 use crate::verify::intersect::judge::{Found, Judge, WidePairs};
-use crate::verify::intersect::neighbours::Neighbours;
+use crate::verify::intersect::near::NearPairs;
 use crate::verify::intersect::pair::{Face, Sharing};
 use crate::verify::intersect::parcels::Parcel;
 use crate::verify::intersect::signs::{Point, is_tame};
@@ -79,7 +80,7 @@ pub(crate) struct Workbench {
     flat: FlatFans,
     flat_corners: Vec<FlatCorners>,
     numbers: Vec<u64>,
-    near: Neighbours,
+    near: NearPairs,
     is_wide: Vec<bool>,
     places: Vec<u32>,
     begun: u64,
@@ -127,7 +128,10 @@ impl Workbench {
             flat_corners[a as usize].share(&flat_corners[b as usize])
                 || crosses && ((a as usize) < border) == ((b as usize) < border)
         };
-        near.each(leaves_out, |a, b| {
+        near.each(&mut |a, b| {
+            if leaves_out(a, b) {
+                return;
+            }
             let sharing = Sharing::of(&faces[a as usize], &faces[b as usize]);
             let queue = &mut queues[sharing.count()];
             queue.push((a, b, sharing));
@@ -155,7 +159,7 @@ impl Workbench {
         faces.clear();
         normals.clear();
         numbers.clear();
-        near.clear();
+        near.boxes.clear();
         is_wide.clear();
         *begun = 0;
         let mut slots = Slots::<N>::with_room(task.parcels.iter().map(Parcel::vertices).sum());
@@ -199,7 +203,7 @@ impl Workbench {
                 }
                 is_wide.push(wide);
                 let range = grid.range(low, high);
-                near.push(range, starts);
+                near.boxes.push(NearBox::new(range.low, range.high, starts));
                 let is_tame = vertices.iter().all(|&vertex| tame[vertex as usize]);
                 let normal = Normal::of(corners);
                 faces.push(Face::of(vertices, &normal, is_tame));

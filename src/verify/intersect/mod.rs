@@ -27,7 +27,6 @@ mod grid;
 mod join;
 mod judge;
 mod near;
-mod neighbours;
 mod pair;
 #[cfg(test)]
 mod pair_tests;

@@ -37,7 +37,7 @@ impl Clustering {
         }
         let is_simple = pieces.iter().all(Node::is_simple)
             && pieces.len() <= usize::from(u8::MAX)
-            && !self.corners.iter().any(|corner| corner.is_cut_by(cell))
+            && !self.corners.are_cut_by(cell)
             && !self.shares_ambiguous_face(cut, cell);
         if !is_simple {
             self.refusals.by_shape += 1;
@@ -65,7 +65,8 @@ impl Clustering {
             cut.collapse(cell, mark, &placed, &self.node_of, first_node);
         }
         cut.placed = placed;
-        self.refusals.by_error += u64::from(!fits);
+        self.refusals.by_error += u64::from(!is_near);
+        self.refusals.by_shape += u64::from(!fits && is_near);
         is_near
     }
 
@@ -78,7 +79,7 @@ impl Clustering {
         placed: &[[i32; 3]],
     ) -> bool {
         let slack = (SHARP_CELLS * self.options.cell_units as f64) as i32 + 1;
-        self.corners.iter().filter(|corner| corner.is_in(cell)).all(|corner| {
+        self.corners.within(cell).iter().all(|corner| {
             let component = cut.leaves.components[usize::from(self.ranks[corner.cell])];
             let node = self.node_of[component as usize] as usize - first_node;
             (0..3).all(|a| (placed[node][a] - corner.position[a]).abs() <= slack)

@@ -30,7 +30,7 @@ pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
 pub use summary::{Part, join};
 
 use crate::contour::mdc::cell::{cell_number, components_of, number_at, place_of, segments_on};
-use crate::contour::mdc::cluster::corners::Corner;
+use crate::contour::mdc::cluster::corners::Corners;
 use crate::contour::mdc::cluster::cut::Cut;
 use crate::contour::mdc::cluster::node::Node;
 use crate::contour::mdc::cluster::planes::{Group, add_group};
@@ -71,7 +71,8 @@ pub struct Leaves {
 pub struct Refusals {
     /// Cells in which a vertex would lie too far from a plane, or there are too many planes.
     pub by_error: u64,
-    /// Cells in which a piece is no disk, or meets a face more than once.
+    /// Cells in which a piece is no disk, or meets a face more than once, or has its vertex outside,
+    /// or would lose a corner of the model.
     pub by_shape: u64,
     /// Largest distance of a vertex to a plane of its cluster.
     pub largest_error: f64,
@@ -88,7 +89,7 @@ pub struct Clustering {
     /// The piece of every component at the level under way, as its number in `nodes`.
     node_of: Vec<u32>,
     joined: Vec<u32>,
-    corners: Vec<Corner>,
+    corners: Corners,
     merged: Vec<Node>,
     merged_groups: Vec<Group>,
     /// Refusals so far in the brick.
@@ -103,6 +104,11 @@ struct Cell {
 }
 
 impl Cell {
+    /// The numbers of the leaf cells that it has room for.
+    fn range(&self) -> Range<usize> {
+        self.number << (3 * self.level)..(self.number + 1) << (3 * self.level)
+    }
+
     /// Whether a leaf cell with this number is in it.
     fn holds(&self, leaf: usize) -> bool {
         leaf >> (3 * self.level) == self.number
@@ -121,7 +127,7 @@ impl Clustering {
             groups: Vec::new(),
             node_of: Vec::new(),
             joined: Vec::new(),
-            corners: Vec::new(),
+            corners: Corners::default(),
             merged: Vec::new(),
             merged_groups: Vec::new(),
             refusals: Refusals::default(),
@@ -136,8 +142,7 @@ impl Clustering {
         self.groups.clear();
         self.node_of.clear();
         self.node_of.resize(brick.positions.len(), 0);
-        self.corners.clear();
-        self.corners.extend(brick.reaches.iter().map(Corner::of));
+        self.corners.reset(&brick.reaches);
         for (rank, &cell) in brick.cells.iter().enumerate() {
             self.ranks[cell_number(cell)] = rank as u16;
         }
