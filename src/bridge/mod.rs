@@ -10,3 +10,4 @@
 //!             Filling holes in meshes.
 
 pub mod fill;
+pub mod pair;
