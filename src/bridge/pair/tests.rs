@@ -126,15 +126,20 @@ fn joined(triangles: &[Triangle], max_gap: f64) -> Joined {
 
 /// The volume that is inside by parity, by rays along an axis.
 fn volume(triangles: &[Triangle], low: f64, high: f64) -> f64 {
-    let (steps, size) = (40, high - low);
+    let (steps, size) = (60, high - low);
     let mut inside = 0.0;
-    for (i, j) in (0..steps).flat_map(|i| (0..steps).map(move |j| (i, j))) {
-        // Off the lattice of the models.
-        let at = |i: i32| low + size * (f64::from(i) + 0.513_7) / f64::from(steps);
-        let (x, y) = (at(i), at(j) + 1e-5 * f64::from(i));
-        let mut hits: Vec<f64> = triangles.iter().filter_map(|t| height_at(t, x, y)).collect();
-        hits.sort_by(f64::total_cmp);
-        inside += hits.chunks(2).map(|pair| pair[pair.len() - 1] - pair[0]).sum::<f64>();
+    // Off the lattice of the models.
+    let at = |i: i32| low + size * (f64::from(i) + 0.513_7) / f64::from(steps);
+    for i in 0..steps {
+        let x = at(i);
+        let reaches = |t: &&Triangle| t.iter().any(|p| p.x < x) && t.iter().any(|p| p.x > x);
+        let row: Vec<&Triangle> = triangles.iter().filter(reaches).collect();
+        for j in 0..steps {
+            let y = at(j) + 1e-5 * f64::from(i);
+            let mut hits: Vec<f64> = row.iter().filter_map(|t| height_at(t, x, y)).collect();
+            hits.sort_by(f64::total_cmp);
+            inside += hits.chunks(2).map(|pair| pair[pair.len() - 1] - pair[0]).sum::<f64>();
+        }
     }
     inside * (size / f64::from(steps)).powi(2)
 }
