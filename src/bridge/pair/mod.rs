@@ -90,13 +90,15 @@ pub fn join_rims(rim: &[RimEdge], max_gap: f64) -> Strips {
 fn widest(piece: &Piece, pieces: &Pieces, near: &Near, max_gap: f64) -> Option<u32> {
     let [a, b] = piece.ends;
     let (start, end) = (pieces.at(a), pieces.at(b));
+    let farthest_square = (max_gap + start.distance(end)).powi(2);
     let mut best: Option<(f64, u32, u32)> = None;
     near.visit((start + end) / 2.0, |corner| {
-        if corner == a || corner == b || !faces(piece, corner, pieces, max_gap) {
-            return;
-        }
         let place = pieces.at(corner);
         let (to_start, to_end) = (start - place, end - place);
+        let farthest = to_start.length_squared().max(to_end.length_squared());
+        if corner == a || corner == b || farthest > farthest_square {
+            return;
+        }
         let cosine = to_start.normalize_or_zero().dot(to_end.normalize_or_zero());
         // Of a rectangle both sides see both diagonals; they agree on the one with the lowest end.
         let far = if to_start.length_squared() > to_end.length_squared() { a } else { b };
@@ -104,7 +106,7 @@ fn widest(piece: &Piece, pieces: &Pieces, near: &Near, max_gap: f64) -> Option<u
         let is_better = best.is_none_or(|(least, other, _)| {
             cosine < least - ALIKE || cosine < least + ALIKE && lowest < other
         });
-        if is_better {
+        if is_better && faces(piece, corner, pieces, max_gap) {
             best = Some((cosine, lowest, corner));
         }
     });
