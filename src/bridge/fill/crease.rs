@@ -1,16 +1,23 @@
 //! Creases of the surface that run into an opening, and how they go on in it.
 //!
-//! Two that lie on one line are joined. Three to six that meet in a point are led to it, so that a
+//! Two that lie on one line, or on one arc of a circle, are joined. Three to six that meet in a point are led to it, so that a
 //! corner that was cut off is there again.
 
 use glam::{DMat3, DVec3};
 
+/// Creases of an arc leave its chord by up to 60 degrees.
+const ARC_COSINE: f64 = 0.5;
+/// How much more than the crease a face may turn, as a difference of cosines.
+const ARC_SLACK: f64 = 0.1;
+/// Points of one arc.
+const MOST_OF_ARC: f64 = 256.0;
 /// Creases that may end at a loop; where there are more, the surface is round.
 const MOST_CREASES: usize = 64;
 /// Creases that may meet in a corner; cones and domes of few facets have more.
 const MOST_AT_CORNER: usize = 6;
-/// Creases of a corner are bent by 30 degrees or more, not those of coarse domes.
-const CORNER_COSINE: f64 = 0.866;
+/// Creases of a corner or an arc are bent by 30 degrees or more, not those of coarse domes.
+
+const SHARP_COSINE: f64 = 0.866;
 /// Triangles that make a crease do not lie on one another: their angle is at least 6 degrees.
 const LEAST_SINE: f64 = 0.1;
 /// A corner is at most this far from the rim, in diameters of the loop.
@@ -24,11 +31,13 @@ const ALONG_RIM: f64 = 0.02;
 #[derive(Clone, Copy, Debug)]
 pub struct Angles {
     crease_cosine: f64,
+    /// Whether creases are joined by arcs.
+    pub arcs: bool,
 }
 
 impl Angles {
     pub fn new(crease_deg: f64) -> Self {
-        Self { crease_cosine: cosine(crease_deg.clamp(0.0, 90.0).to_radians()) }
+        Self { crease_cosine: cosine(crease_deg.clamp(0.0, 90.0).to_radians()), arcs: true }
     }
 }
 
@@ -38,6 +47,8 @@ pub struct Creases {
     pub ends: Vec<usize>,
     /// The point in which they meet; without it the two ends are joined.
     pub apex: Option<DVec3>,
+    /// Points between the two ends, from the first to the second.
+    pub path: Vec<DVec3>,
 }
 
 /// A corner of the loop with a crease.
@@ -47,6 +58,12 @@ struct Arrival {
     normals: [DVec3; 2],
     /// From the corner into the surface around.
     outward: DVec3,
+}
+
+impl Arrival {
+    fn is_sharp(&self) -> bool {
+        self.normals[0].dot(self.normals[1]) < SHARP_COSINE
+    }
 }
 
 /// Creases by which the loop is to be divided; the parts may have more of them.
@@ -74,35 +91,92 @@ pub fn find_creases(
     if arrivals.len() < 2 || arrivals.len() > MOST_CREASES {
         return None;
     }
-    straight_line(points, &arrivals, angles, cell)
+    one_line(points, &arrivals, angles, cell, false)
         .or_else(|| meeting_point(points, &arrivals, cell))
+        .or_else(|| one_line(points, &arrivals, angles, cell, true).filter(|_| angles.arcs))
 }
 
-/// The two ends that lie best on one line.
-fn straight_line(
+/// The two ends that lie best on one line, or on one arc.
+fn one_line(
     points: &[DVec3],
     arrivals: &[Arrival],
     angles: Angles,
     cell: f64,
+    is_arc: bool,
 ) -> Option<Creases> {
-    let mut best: Option<(f64, [usize; 2])> = None;
+    let mut best: Option<(f64, [&Arrival; 2])> = None;
     for (i, one) in arrivals.iter().enumerate() {
         for two in &arrivals[i + 1..] {
             let chord = (points[two.corner] - points[one.corner]).normalize_or_zero();
-            let straight = chord.dot(one.direction).abs().min(chord.dot(two.direction).abs());
-            // What is left of the crease at one end is right of it at the other.
-            let same = one.normals[0].dot(two.normals[1]).min(one.normals[1].dot(two.normals[0]));
-            let into = one.outward.dot(chord) <= 0.0 && two.outward.dot(chord) >= 0.0;
-            let agree = into && straight.min(same) >= angles.crease_cosine;
-            if agree
-                && best.is_none_or(|(so_far, _)| straight > so_far)
+            let Some(straight) = angles.straightness(one, two, chord, is_arc) else { continue };
+            if best.is_none_or(|(so_far, _)| straight > so_far)
                 && !runs_along_rim(points, [one.corner, two.corner], cell)
             {
-                best = Some((straight, [one.corner, two.corner]));
+                best = Some((straight, [one, two]));
             }
         }
     }
-    best.map(|(_, ends)| Creases { ends: ends.to_vec(), apex: None })
+    let (_, [one, two]) = best?;
+    let ends = vec![one.corner, two.corner];
+    let path = if is_arc { arc(points, one, two, cell) } else { Vec::new() };
+    Some(Creases { ends, apex: None, path })
+}
+
+impl Angles {
+    /// Cosine of the angle between two creases and the line that joins them, if they go on in each
+    /// other.
+    fn straightness(
+        &self,
+        one: &Arrival,
+        two: &Arrival,
+        chord: DVec3,
+        is_arc: bool,
+    ) -> Option<f64> {
+        let into = one.outward.dot(chord) <= 0.0 && two.outward.dot(chord) >= 0.0;
+        let [first, second] = [one, two].map(|arrival| along(arrival.direction, chord));
+        let straight = first.dot(chord).min(second.dot(chord));
+        // What is left of the crease at one end is right of it at the other.
+        let left = one.normals[0].dot(two.normals[1]);
+        let right = one.normals[1].dot(two.normals[0]);
+        if !is_arc {
+            let is_straight = straight.min(left).min(right) >= self.crease_cosine;
+            return (into && is_straight).then_some(straight);
+        }
+        // On an arc both ends lean to the same side of the chord, by the same angle; one face
+        // stays as it is, the other turns with the crease.
+        let is_even = (first + second).normalize_or_zero().dot(chord) >= self.crease_cosine;
+        let turns = first.dot(second) - ARC_SLACK;
+        let goes_on = left.max(right) >= self.crease_cosine && left.min(right) >= turns;
+        let is_sharp = one.is_sharp() && two.is_sharp();
+        (into && is_even && goes_on && is_sharp && straight >= ARC_COSINE).then_some(straight)
+    }
+}
+
+fn along(direction: DVec3, chord: DVec3) -> DVec3 {
+    if direction.dot(chord) < 0.0 { -direction } else { direction }
+}
+
+/// Points of a curve between two ends, along their creases: a cubic, close to an arc of a circle.
+fn arc(points: &[DVec3], one: &Arrival, two: &Arrival, cell: f64) -> Vec<DVec3> {
+    let (start, end) = (points[one.corner], points[two.corner]);
+    let chord = end - start;
+    let axis = chord.normalize_or_zero();
+    let [first, second] = [one, two].map(|arrival| along(arrival.direction, axis));
+    // The controls of an arc of angle t are chord / (3 cos^2(t / 4)) away: within a thousandth for
+    // half angles up to 60 degrees.
+    let cosine = (first.dot(axis) + second.dot(axis)) / 2.0;
+    let reach = chord.length() * 2.0 / (3.0 * (1.0 + cosine));
+    let controls = [start, start + reach * first, end - reach * second, end];
+    let count = (chord.length() / cell).ceil().clamp(1.0, MOST_OF_ARC) as u32;
+    let at = |k: u32| {
+        let t = f64::from(k) / f64::from(count);
+        let s = 1.0 - t;
+        s * s * s * controls[0]
+            + 3.0 * s * s * t * controls[1]
+            + 3.0 * s * t * t * controls[2]
+            + t * t * t * controls[3]
+    };
+    (1..count).map(at).collect()
 }
 
 /// Whether the rim between two corners, on either side, is the line between them.
@@ -120,8 +194,7 @@ fn runs_along_rim(points: &[DVec3], [from, to]: [usize; 2], cell: f64) -> bool {
 
 /// The point in which all creases meet.
 fn meeting_point(points: &[DVec3], arrivals: &[Arrival], cell: f64) -> Option<Creases> {
-    let sharp = |a: &Arrival| a.normals[0].dot(a.normals[1]) < CORNER_COSINE;
-    if !(3..=MOST_AT_CORNER).contains(&arrivals.len()) || !arrivals.iter().all(sharp) {
+    if !(3..=MOST_AT_CORNER).contains(&arrivals.len()) || !arrivals.iter().all(Arrival::is_sharp) {
         return None;
     }
     let origin = points[arrivals[0].corner];
@@ -151,8 +224,11 @@ fn meeting_point(points: &[DVec3], arrivals: &[Arrival], cell: f64) -> Option<Cr
             && to_apex.dot(a.outward) < 0.0
     };
     let is_new = apex.is_finite() && points.iter().all(|&point| point != apex);
-    (is_new && arrivals.iter().all(meets))
-        .then(|| Creases { ends: arrivals.iter().map(|a| a.corner).collect(), apex: Some(apex) })
+    (is_new && arrivals.iter().all(meets)).then(|| Creases {
+        ends: arrivals.iter().map(|a| a.corner).collect(),
+        apex: Some(apex),
+        path: Vec::new(),
+    })
 }
 
 /// The same on every machine, unlike that of the system's library.

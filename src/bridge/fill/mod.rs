@@ -81,7 +81,13 @@ pub fn fill_loop(rim: &RimLoop, options: &FillOptions) -> Option<Fill> {
         return None;
     }
     let mut fills = Fills::new(rim, options);
-    fills.fill(Part::whole(rim)).then(|| fills.finish())
+    let mut is_filled = fills.fill(Part::whole(rim));
+    if is_filled && !fills.is_manifold() {
+        // The parts on both sides of an arc have the same chord of it.
+        fills = Fills::without_arcs(rim, options);
+        is_filled = fills.fill(Part::whole(rim));
+    }
+    is_filled.then(|| fills.finish())
 }
 
 /// The area that the loop spans, without filling it: of the smallest fill with no new corners, of a

@@ -3,7 +3,7 @@
 use glam::DVec3;
 
 use crate::bridge::fill::coarse::cut_coarse;
-use crate::bridge::fill::crease::{Angles, find_creases};
+use crate::bridge::fill::crease::{Angles, Creases, find_creases};
 use crate::bridge::fill::flat::{cut_flat, zip};
 use crate::bridge::fill::outline::{Outline, rim_normals};
 use crate::bridge::fill::refine::refine;
@@ -72,6 +72,21 @@ impl<'a> Fills<'a> {
         }
     }
 
+    /// The same, but that creases are only joined by straight lines.
+    pub fn without_arcs(rim: &'a RimLoop, options: &FillOptions) -> Self {
+        let mut fills = Self::new(rim, options);
+        fills.angles.arcs = false;
+        fills
+    }
+
+    /// Whether no edge has more than two triangles.
+    pub fn is_manifold(&self) -> bool {
+        let sides = |&[a, b, c]: &[u32; 3]| [[a, b], [b, c], [c, a]];
+        let mut sides: Vec<[u32; 2]> = self.triangles.iter().flat_map(sides).collect();
+        sides.sort_unstable();
+        sides.windows(2).all(|pair| pair[0] != pair[1])
+    }
+
     pub fn finish(self) -> Fill {
         let (rim, places) = (&self.rim.points, &self.places);
         let place = |corner: u32| {
@@ -95,7 +110,7 @@ impl<'a> Fills<'a> {
         let normals = rim_normals(&points, &part.opposite);
         let creases = find_creases(&points, &part.opposite, &normals, self.angles, self.cell);
         if let Some(creases) = creases.filter(|_| points.len() <= LONGEST_LOOP) {
-            return self.divide(&part, &creases.ends, creases.apex);
+            return self.divide(&part, creases);
         }
         if self.is_flat(&points, &normals, &outline) {
             self.add(&part, cut_flat(&points), FillKind::Flat);
@@ -108,13 +123,13 @@ impl<'a> Fills<'a> {
     }
 
     /// Fills the parts between creases, each on its own.
-    fn divide(&mut self, part: &Part, ends: &[usize], apex: Option<DVec3>) -> bool {
-        let apex = apex.map(|place| {
-            self.places.push(place);
-            self.places.len() as u32 - 1
-        });
+    fn divide(&mut self, part: &Part, creases: Creases) -> bool {
+        let ends = &creases.ends;
+        let first = self.places.len() as u32;
         // A line from end to end counts once.
-        self.creases += if apex.is_some() { ends.len() as u32 } else { 1 };
+        self.creases += if creases.apex.is_some() { ends.len() as u32 } else { 1 };
+        self.places.extend(creases.apex.into_iter().chain(creases.path));
+        let mut between: Vec<u32> = (first..self.places.len() as u32).collect();
         let count = part.corners.len();
         let mut all = true;
         for (i, &from) in ends.iter().enumerate() {
@@ -123,11 +138,10 @@ impl<'a> Fills<'a> {
             let at = |step: usize| (from + step) % count;
             let mut corners: Vec<u32> = (0..=edges).map(|step| part.corners[at(step)]).collect();
             let mut opposite: Vec<_> = (0..edges).map(|step| part.opposite[at(step)]).collect();
-            opposite.push(None);
-            if let Some(apex) = apex {
-                corners.push(apex);
-                opposite.push(None);
-            }
+            // Back to where this part began: on the first part against the path.
+            between.reverse();
+            corners.extend(&between);
+            opposite.resize(corners.len(), None);
             all &= self.fill(Part { corners, opposite });
         }
         all

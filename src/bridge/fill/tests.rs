@@ -315,6 +315,32 @@ fn holes_of_a_cube_are_filled_so_that_nothing_of_it_is_missing() {
 }
 
 #[test]
+fn a_hole_over_the_round_edge_of_a_can_goes_on_along_an_arc() {
+    // The crease is known by the last facets around, which lie half a facet's angle off.
+    for (around, most) in [(48, 0.02), (96, 0.01)] {
+        let mut can = Shell::tube(1.0, 2.0, around, 24);
+        let cap = Shell::grid(around, 12, |i, j| {
+            let angle = TAU * f64::from(i % around) / f64::from(around);
+            let radius = 1.0 - f64::from(j) / 12.0;
+            if j == 12 {
+                DVec3::Z
+            } else {
+                DVec3::new(radius * angle.cos(), radius * angle.sin(), 1.0)
+            }
+        });
+        can.triangles.extend(cap.triangles);
+        let rim = can.opened(|p| p.distance(DVec3::new(1.0, 0.0, 1.0)) < 0.55);
+        let fill = filled(&rim, 0.03);
+        assert_eq!((fill.kind, fill.creases), (FillKind::Smooth, 1));
+        let error = worst(&fill, |p| {
+            let radius = p.truncate().length();
+            (radius - 1.0).abs().min((p.z - 1.0).abs()).max(radius - 1.0).max(p.z - 1.0)
+        });
+        assert!(error < most, "{around}: {error}");
+    }
+}
+
+#[test]
 fn a_corner_that_was_cut_off_by_a_plane_is_there_again() {
     // Three edges, and three faces behind them.
     let points =
