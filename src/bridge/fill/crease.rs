@@ -5,6 +5,8 @@
 
 use glam::{DMat3, DVec3};
 
+/// A crease enters the opening if the surface around lies 60 degrees to the side, or behind.
+const INTO_COSINE: f64 = 0.5;
 /// Creases of an arc leave its chord by up to 60 degrees.
 const ARC_COSINE: f64 = 0.5;
 /// How much more than the crease a face may turn, as a difference of cosines.
@@ -16,7 +18,6 @@ const MOST_CREASES: usize = 64;
 /// Creases that may meet in a corner; cones and domes of few facets have more.
 const MOST_AT_CORNER: usize = 6;
 /// Creases of a corner or an arc are bent by 30 degrees or more, not those of coarse domes.
-
 const SHARP_COSINE: f64 = 0.866;
 /// Triangles that make a crease do not lie on one another: their angle is at least 6 degrees.
 const LEAST_SINE: f64 = 0.1;
@@ -132,7 +133,9 @@ impl Angles {
         chord: DVec3,
         is_arc: bool,
     ) -> Option<f64> {
-        let into = one.outward.dot(chord) <= 0.0 && two.outward.dot(chord) >= 0.0;
+        // Where the rim runs along the crease a little, what is around lies to the side.
+        let leans = |a: &Arrival, ahead: DVec3| a.outward.normalize_or_zero().dot(ahead);
+        let into = leans(one, chord) <= INTO_COSINE && leans(two, -chord) <= INTO_COSINE;
         let [first, second] = [one, two].map(|arrival| along(arrival.direction, chord));
         let straight = first.dot(chord).min(second.dot(chord));
         // What is left of the crease at one end is right of it at the other.
