@@ -7,13 +7,13 @@ use crate::contour::{
     write_surface,
 };
 use crate::ingest::{
-    BinEntry, Bins, KeptBin, KeptBins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure,
-    drop_fins, fill_bins, read_soup, settle,
+    Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins,
+    read_soup, settle,
 };
 use crate::io::{ReadOptions, check_output};
 use crate::mesh::{SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
-use crate::octree::{BrickKey, Domain, Flips};
+use crate::octree::{Domain, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::choose::{Trials, most_trials};
@@ -23,7 +23,7 @@ use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
-use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
+use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
 use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
@@ -396,16 +396,8 @@ fn scan_bins(
     let files = workspace.files();
     let bins = Bins::open(resources, &files, findings.left_out)?;
     let settled = Settled::open(resources, &files, findings.settle)?;
-    let mut kept = KeptBins::new(&bins, &settled);
-    let mut next = || {
-        let item = |KeptBin { entry: BinEntry { brick, first, count }, drops }| {
-            let brick = BrickKey(brick);
-            ScanItem { brick, first, count, drops }
-        };
-        Ok(kept.next_bin()?.map(item))
-    };
-    let (triangles, drops) = (&bins.triangles, &settled.drops);
-    let (hits, stats) = scan(triangles, drops, &mut next, findings.domain(), resources)?;
+    let soup = bins.without(&settled.drops);
+    let (hits, stats) = scan(&soup, findings.domain(), resources)?;
     findings.scan = stats;
     Ok(hand_on(hits, &mut handles.hits))
 }
