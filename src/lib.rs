@@ -19,6 +19,7 @@
 //! the floor, output grids too coarse for the depth. `ARCHITECTURE.md` shows the rooms and their
 //! invariants.
 
+pub mod bridge;
 pub mod contour;
 pub mod defect;
 pub mod geom;

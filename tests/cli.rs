@@ -206,11 +206,11 @@ fn json_stands_alone_on_stdout() {
     let json: serde_json::Value = serde_json::from_str(&out).expect("stdout is JSON");
     assert_eq!(json["schema"], 1);
     assert_eq!(json["output"]["proof"]["boundary_edges"], 0);
-    assert_eq!(json["found"]["openings"], 1);
+    assert_eq!(json["mend"]["filled_holes"], 1);
     let size = std::fs::metadata(&output).expect("the output is there").len();
     assert_eq!(json["output"]["bytes"], size);
     assert!(json["memory"]["peak_bytes"].as_u64().is_some_and(|bytes| bytes > 1 << 20));
-    for stage in ["ingest", "scan", "patch", "sign", "contour", "verify"] {
+    for stage in ["ingest", "bridge", "scan", "patch", "sign", "contour", "verify"] {
         assert!(json["stages"][stage]["seconds"].is_f64(), "{stage}");
     }
 }

@@ -68,7 +68,7 @@ fn a_fin_goes_and_leaves_the_box_as_if_it_had_never_been() {
 fn a_fin_that_is_wanted_becomes_a_plate() {
     let (outcome, surface) = with_rule(&finned_box(), SheetRule::KeepFins, 7);
     assert_eq!(outcome.found.settle.fins.fins, 0);
-    assert!(outcome.invented.sheet_corners > 0);
+    assert_eq!((outcome.mend.walled_shells, outcome.invented.sheet_corners), (2, 0));
     assert!(surface.proof.volume > 8.0);
 }
 

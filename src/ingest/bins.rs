@@ -47,8 +47,13 @@ impl Bins {
     /// The soup without what `drops` leaves out.
     #[must_use]
     pub fn without<'b>(&'b self, drops: &'b Spool<DropRecord>) -> BinnedSoup<'b> {
-        let bins = BinSpools { triangles: &self.triangles, entries: &self.entries };
-        BinnedSoup { bins, drops, added: None }
+        BinnedSoup { bins: self.spools(), drops, added: None }
+    }
+
+    /// The bins as they are.
+    #[must_use]
+    pub fn spools(&self) -> BinSpools<'_> {
+        BinSpools { triangles: &self.triangles, entries: &self.entries }
     }
 
     /// The files, as they have to be found again.

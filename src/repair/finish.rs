@@ -15,6 +15,8 @@ use crate::verify::Proof;
 
 /// Losing more than this share of the area is worth a look.
 const LOST_AREA_SHARE: f64 = 0.2;
+/// More of the area than this in walls is worth a look.
+const WALLED_AREA_SHARE: f64 = 0.05;
 /// So is filling more than this share of the volume.
 const FILLED_VOLUME_SHARE: f64 = 0.05;
 
@@ -76,6 +78,7 @@ pub fn conclude(
             contour: findings.contour,
             caveat: run.settings.method.caveat().map(str::to_owned),
         },
+        mend: findings.mend.clone(),
         scan: findings.scan,
         patch: findings.patch.clone(),
         sign: findings.sign,
@@ -144,6 +147,19 @@ fn reasons(
         let share = dropped.share_of_surface * 100.0;
         reasons.push(format!(
             "{share:.0} % of the grid edges that triangles cross belong to walls thinner than a cell"
+        ));
+    }
+    let walled = findings.mend.walled_area / findings.measure.area.max(f64::MIN_POSITIVE);
+    if walled > WALLED_AREA_SHARE {
+        reasons.push(format!(
+            "{:.0} % of the area belongs to open sheets, which became walls",
+            walled * 100.0
+        ));
+    }
+    if findings.mend.crowded_rims > 0 {
+        reasons.push(format!(
+            "{} edges are open in places with too many of them to tell holes; the patch closed them",
+            findings.mend.crowded_rims
         ));
     }
     if invented.sheet_corners > 0 {

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize, Serializer};
 
+use crate::bridge::MendStats;
 use crate::contour::ContourStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
 use crate::monitor::{Counter, Gauge, Stage};
@@ -179,6 +180,8 @@ pub struct Outcome {
     pub dropped: Dropped,
     /// The output.
     pub output: OutputReport,
+    /// Counts of mending: walls and fills.
+    pub mend: MendStats,
     /// Counts of scan, patch and sign.
     pub scan: ScanStats,
     /// See `scan`.

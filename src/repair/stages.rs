@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::bridge::{HoleRule, MendOptions, MendStats, Mended, mend};
 use crate::contour::{
     CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
     write_surface,
@@ -19,8 +20,10 @@ use crate::repair::RepairError;
 use crate::repair::choose::{Trials, most_trials};
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
+use crate::repair::length::Reach;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
+use crate::repair::settings::MaxHole;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
@@ -48,6 +51,7 @@ pub struct Findings {
     /// Bricks that triangles touch.
     pub bins: u64,
     pub settle: SettleStats,
+    pub mend: MendStats,
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub sign: SignStats,
@@ -120,6 +124,7 @@ impl Run<'_> {
             Step::Read => self.read(findings, resources)?,
             Step::Bin => self.bin(workspace, findings, resources)?,
             Step::Settle => self.settle(workspace, findings, resources)?,
+            Step::Mend => self.mend(workspace, findings, resources)?,
             Step::Scan => scan_bins(workspace, findings, handles, resources)?,
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
             Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
@@ -140,6 +145,7 @@ impl Run<'_> {
             Step::Read => std::fs::metadata(self.input).map_or(0, |file| file.len()),
             Step::Bin => findings.soup().stats.triangles,
             Step::Settle | Step::Scan => findings.bins,
+            Step::Mend => 0,
             Step::Patch => findings.scan.open_bricks,
             Step::Flood | Step::Sign => findings.scan.bricks,
             Step::Choose if self.settings.max_triangles.is_some() => {
@@ -169,12 +175,14 @@ impl Run<'_> {
         if soup.spool.is_empty() {
             return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
-        let (depth, bounds) = (self.settings.depth, &soup.facts.bounds);
-        let domain = choose_domain(self.input, bounds, depth, self.format)?;
+        let (settings, bounds) = (&self.settings, &soup.facts.bounds);
+        let thickness = settings.sheet_thickness;
+        let domain = choose_domain(self.input, bounds, settings.depth, thickness, self.format)?;
         if self.levels().iter().any(|level| level.decimate.in_cells(bounds, &domain).is_none()) {
             return Err(RepairError::NoUnit { path: self.input.to_path_buf() });
         }
         findings.domain = Some(domain);
+        self.mend_options(findings)?;
         Ok(soup.files())
     }
 
@@ -209,6 +217,43 @@ impl Run<'_> {
         let settled = drop_fins(&bins, settled, rule, domain, (triangles, area), resources)?;
         findings.settle = settled.stats;
         Ok(vec![settled.drops.state().clone()])
+    }
+
+    fn mend(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        let files = workspace.files();
+        let bins = Bins::open(resources, &files, findings.left_out)?;
+        let settled = Settled::open(resources, &files, findings.settle)?;
+        let soup = bins.without(&settled.drops);
+        let triangles = (findings.soup().stats.triangles, findings.settle.rim_edges > 0);
+        let options = self.mend_options(findings)?;
+        let (mended, stats) = mend(&soup, &options, findings.domain(), triangles, resources)?;
+        findings.mend = stats;
+        Ok(mended.files())
+    }
+
+    fn mend_options(&self, findings: &Findings) -> Result<MendOptions, RepairError> {
+        let (bounds, domain) = (&findings.soup().bounds, findings.domain());
+        let in_model_units = |length: Reach| {
+            let cells = length.in_cells(bounds, domain);
+            let no_unit = || RepairError::NoUnit { path: self.input.to_path_buf() };
+            cells.map(|cells| cells * domain.cell_size()).ok_or_else(no_unit)
+        };
+        let settings = &self.settings;
+        Ok(MendOptions {
+            holes: match settings.max_hole {
+                MaxHole::Auto => HoleRule::Auto,
+                MaxHole::All => HoleRule::All,
+                MaxHole::Size(size) => HoleRule::UpTo(in_model_units(size)?),
+            },
+            max_gap: in_model_units(settings.max_gap)?,
+            thickness: in_model_units(settings.sheet_thickness)?,
+            bounds: *bounds,
+        })
     }
 
     fn sign(
@@ -395,8 +440,8 @@ fn scan_bins(
 ) -> Result<Vec<FileState>, RepairError> {
     let files = workspace.files();
     let bins = Bins::open(resources, &files, findings.left_out)?;
-    let settled = Settled::open(resources, &files, findings.settle)?;
-    let soup = bins.without(&settled.drops);
+    let mended = Mended::open(resources, &files)?;
+    let soup = mended.soup(bins.spools());
     let (hits, stats) = scan(&soup, findings.domain(), resources)?;
     findings.scan = stats;
     Ok(hand_on(hits, &mut handles.hits))

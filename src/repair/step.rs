@@ -3,6 +3,7 @@
 //! A step is what a checkpoint can say of: it is finished, and its files are there. A stage that
 //! takes long is made of several.
 
+use crate::bridge::{ADDED, ADDED_ENTRIES, LEFT_OUT};
 use crate::contour::{CELLS, SURFACE};
 use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, SOUP};
 use crate::monitor::Stage;
@@ -22,6 +23,8 @@ pub enum Step {
     Bin,
     /// Copies are settled, rims counted.
     Settle,
+    /// Open sheets become walls, holes are filled.
+    Mend,
     /// Bins become bricks of hits.
     Scan,
     /// Odd faces become flips.
@@ -44,10 +47,11 @@ pub enum Step {
 
 impl Step {
     /// All steps.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 13] = [
         Self::Read,
         Self::Bin,
         Self::Settle,
+        Self::Mend,
         Self::Scan,
         Self::Patch,
         Self::Flood,
@@ -65,6 +69,7 @@ impl Step {
             Self::Read => "read",
             Self::Bin => "bin",
             Self::Settle => "settle",
+            Self::Mend => "mend",
             Self::Scan => "scan",
             Self::Patch => "patch",
             Self::Flood => "flood",
@@ -81,6 +86,7 @@ impl Step {
     pub const fn stage(self) -> Stage {
         match self {
             Self::Read | Self::Bin | Self::Settle => Stage::Ingest,
+            Self::Mend => Stage::Bridge,
             Self::Scan => Stage::Scan,
             Self::Patch => Stage::Patch,
             Self::Flood | Self::Sign => Stage::Sign,
@@ -95,6 +101,7 @@ impl Step {
             Self::Read => &[SOUP, ATTRIBUTES],
             Self::Bin => &[BINS, BIN_ENTRIES],
             Self::Settle => &[DROPS],
+            Self::Mend => &[LEFT_OUT, ADDED, ADDED_ENTRIES],
             Self::Scan => &[HITS],
             Self::Patch => &[FLIPS],
             Self::Flood => &[FLOODED, REGIONS, SHEETS],
@@ -112,7 +119,8 @@ impl Step {
             Self::Read => &[],
             Self::Bin => &[SOUP],
             Self::Settle => &[BINS, BIN_ENTRIES],
-            Self::Scan => &[BINS, BIN_ENTRIES, DROPS],
+            Self::Mend => &[BINS, BIN_ENTRIES, DROPS],
+            Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
             Self::Patch => &[HITS],
             Self::Flood => &[HITS, FLIPS],
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, SHEETS],

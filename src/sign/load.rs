@@ -127,9 +127,10 @@ impl Loaded {
         }
     }
 
-    /// Before the flips are applied: which of them fall on odd edges.
+    /// Before the flips are applied: which of them fall on odd edges, but for those at cracks.
     fn find_sheet_edges(&mut self, view: &View, flips: &[FlipRecord]) -> Result<(), SignError> {
-        let mut flips = flips.iter().filter(|flip| self.marks.get(flip.edge)).peekable();
+        let of_sheet = |flip: &&FlipRecord| flip.at_crack == 0 && self.marks.get(flip.edge);
+        let mut flips = flips.iter().filter(of_sheet).peekable();
         if flips.peek().is_none() {
             return Ok(());
         }
