@@ -112,7 +112,7 @@ fn records_of_spools_are_as_documented() {
             offset_of!(FlipRecord, brick),
             offset_of!(FlipRecord, edge),
             offset_of!(FlipRecord, offset),
-            offset_of!(FlipRecord, at_crack),
+            offset_of!(FlipRecord, unused),
         ],
     );
 }

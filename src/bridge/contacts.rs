@@ -47,12 +47,15 @@ pub struct Contact {
     /// Number of the rim edge, and of the sample on it.
     pub rim: u32,
     pub index: u32,
-    /// Number of the sheet whose rim covers it; [`BY_FACE`] where a face does.
+    /// Number of the sheet whose rim covers it; [`ON_FACE`] where it ends on a face, [`LYING`] where
+    /// it lies on one.
     pub sheet: u32,
 }
 
-/// In [`Contact::sheet`]: a face covers the sample.
-pub const BY_FACE: u32 = u32::MAX;
+/// In [`Contact::sheet`]: the rim ends on a face.
+pub const ON_FACE: u32 = u32::MAX;
+/// In [`Contact::sheet`]: the rim lies on a face.
+pub const LYING: u32 = u32::MAX - 1;
 
 impl Record for Contact {
     type Key = (u32, u32, u32);
@@ -103,7 +106,8 @@ pub fn find_contacts(
                 for (sample, ends) in grid.samples_near(triangle) {
                     if ends != Ends::Beside && covers(&sheets, triangle.source, sample, ends)? {
                         let (rim, index) = (sample.rim, sample.index);
-                        outbox.push(Contact { rim, index, sheet: BY_FACE })?;
+                        let sheet = if ends == Ends::Lying { LYING } else { ON_FACE };
+                        outbox.push(Contact { rim, index, sheet })?;
                     }
                 }
                 Ok(())
@@ -187,7 +191,8 @@ impl NearBricks<'_> {
     fn cover(&mut self, samples: &[RimSample]) -> Result<(), StoreError> {
         samples.iter().try_for_each(|sample| {
             let (rim, index) = (sample.rim, sample.index);
-            self.crowd.push(Contact { rim, index, sheet: BY_FACE })
+            // As if a rim of its own sheet faced it.
+            self.crowd.push(Contact { rim, index, sheet: sample.sheet })
         })
     }
 }

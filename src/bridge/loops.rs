@@ -13,6 +13,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::bridge::rims::RimEdge;
+use crate::bridge::shells::Cover;
 
 /// Rim edges of one shell beyond which it is left to the patch.
 pub const MOST_RIMS: usize = 1 << 16;
@@ -26,19 +27,18 @@ pub struct ShellRim {
     pub edge: RimEdge,
     /// Its ends on the lattice, packed.
     pub ends: [u128; 2],
-    /// 0 to 1.
-    pub covered: f64,
+    pub cover: Cover,
 }
 
 impl ShellRim {
-    /// Whether more of it is open than covered.
+    /// Whether no other rim faces most of it.
     pub fn is_open(&self) -> bool {
-        self.covered < 0.5
+        self.cover.faced < 0.5
     }
 
-    /// Length that nothing covers.
+    /// Length that no other rim faces.
     pub fn open_length(&self) -> f64 {
-        self.edge.length() * (1.0 - self.covered)
+        self.edge.length() * (1.0 - self.cover.faced)
     }
 }
 
@@ -61,6 +61,18 @@ impl Opening {
     /// The begin of each edge.
     pub fn points(&self, rims: &[ShellRim]) -> Vec<DVec3> {
         self.steps.iter().map(|step| end_of(&rims[step.rim], step.backward)).collect()
+    }
+
+    /// The share of its length that ends on faces or lies on them; and that lies.
+    pub fn held(&self, rims: &[ShellRim]) -> [f64; 2] {
+        let [mut length, mut held, mut lying] = [0.0; 3];
+        for step in &self.steps {
+            let rim = &rims[step.rim];
+            length += rim.edge.length();
+            held += rim.edge.length() * (rim.cover.on_face + rim.cover.lying);
+            lying += rim.edge.length() * rim.cover.lying;
+        }
+        [held, lying].map(|part| part / length.max(f64::MIN_POSITIVE))
     }
 
     /// Area of the fan from the middle of the loop: not less than that of a flat fill.

@@ -28,6 +28,7 @@ mod rims;
 mod samples;
 mod sheets;
 mod shells;
+mod thicken;
 mod walls;
 
 use serde::{Deserialize, Serialize};
@@ -45,6 +46,7 @@ use crate::octree::{
 use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError};
 
 pub use loops::MOST_RIMS;
+pub use thicken::{THICKENED, ThickenStats, Thickened, thicken};
 
 /// Spools of the triangles that were added, of their bins, and of all triangles that do not count.
 pub const ADDED: &str = "added.spool";
@@ -98,6 +100,8 @@ pub struct MendStats {
     pub walled_triangles: u64,
     /// Their area, counted once.
     pub walled_area: f64,
+    /// Triangles of walls and fills; their source numbers follow upon those of the input.
+    pub added_triangles: u64,
     /// Openings that were filled.
     pub filled_holes: u64,
     /// Area of the fills.
@@ -186,6 +190,7 @@ pub fn mend(
     if is_open && triangles <= sheets::MOST_TRIANGLES {
         mend_open(soup, options, (&mut added, &mut drops), &mut stats, resources)?;
     }
+    stats.added_triangles = added.next - triangles;
     let mut reader = soup.drops.reader(0, soup.drops.len());
     while let Some(block) = reader.next_block()? {
         drops.extend(block)?;

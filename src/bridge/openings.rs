@@ -13,7 +13,7 @@ use glam::DVec3;
 
 use crate::bridge::loops::{MOST_RIMS, Opening, ShellRim, trace};
 use crate::bridge::rims::RimEdge;
-use crate::bridge::shells::{RimOfShell, Shells};
+use crate::bridge::shells::{Cover, RimOfShell, Shells};
 use crate::bridge::{Added, FilledHole, HoleRule, MendOptions, MendStats};
 use crate::octree::Domain;
 use crate::octree::points::pack_point;
@@ -24,6 +24,12 @@ const WANTED_SHARE: f64 = 0.1;
 
 /// Where a flat fill has more of its shell's area, the shell is a panel: its fill is the shell.
 const PANEL_SHARE: f64 = 2.0 / 3.0;
+
+/// A panel lies on a face where so much of its rim does.
+const LYING_SHARE: f64 = 0.9;
+
+/// More than this of a rim on another part's face: the two run flush there.
+const FLUSH_SHARE: f64 = 0.2;
 
 /// Less open rim than this is left to the patch.
 const LEAST_OPEN_CELLS: f64 = 4.0;
@@ -79,9 +85,9 @@ fn read_rims(
     for &number in numbers {
         edges.clear();
         rims.read(number.into(), 1, &mut edges)?;
-        let (edge, covered) = (edges[0], shells.covered(number)?);
+        let (edge, cover) = (edges[0], shells.cover(number)?);
         let packed = |i: usize| pack_point(on_lattice(edge.corners[i], shells.domain));
-        of_shell.push(ShellRim { edge, ends: [packed(0), packed(1)], covered });
+        of_shell.push(ShellRim { edge, ends: [packed(0), packed(1)], cover });
     }
     Ok(of_shell)
 }
@@ -110,22 +116,28 @@ impl Decision<'_> {
         sheets.dedup();
         let shell = shells.together(&sheets)?;
         let openings = trace(self.rims);
-        let wanted = openings.iter().filter(|o| self.is_wanted(o, shell.area)).count();
-        if wanted > 0 || self.is_held_panel(&sheets, shell.area) {
+        let wanted: Vec<&Opening> =
+            openings.iter().filter(|opening| self.is_wanted(opening, shell.area)).collect();
+        if !wanted.is_empty() || self.is_held_panel(&sheets, shell.area) {
             self.stats.walled_shells += 1;
             self.stats.walled_triangles += shell.triangles;
             self.stats.walled_area += shell.area;
-            self.stats.wanted_openings += wanted as u64;
-            return shells.wall(&sheets);
+            self.stats.wanted_openings += wanted.len() as u64;
+            let is_free = wanted.iter().all(|opening| opening.held(self.rims)[0] < 0.5);
+            return shells.wall(&sheets, is_free);
         }
         openings.iter().try_for_each(|opening| self.close(opening, added))
     }
 
     fn is_wanted(&self, opening: &Opening, area: f64) -> bool {
         let share = opening.area(self.rims) / area;
+        let [_, lying] = opening.held(self.rims);
         match self.options.holes {
-            _ if share > PANEL_SHARE => true,
+            // A panel that lies on a face is a part of it, as a decal is.
+            _ if share > PANEL_SHARE => lying < LYING_SHARE,
             HoleRule::All => false,
+            // Cut open by a part that runs flush with it, it is no vessel: parts unite.
+            HoleRule::Auto if lying > FLUSH_SHARE && lying < LYING_SHARE => false,
             HoleRule::Auto => share > WANTED_SHARE,
             HoleRule::UpTo(size) => {
                 let [lo, hi] = bounds(&opening.points(self.rims));
@@ -141,14 +153,17 @@ impl Decision<'_> {
             return false;
         }
         let bare: Vec<ShellRim> =
-            self.rims.iter().map(|rim| ShellRim { covered: 0.0, ..*rim }).collect();
+            self.rims.iter().map(|rim| ShellRim { cover: Cover::default(), ..*rim }).collect();
+        let lying: f64 = self.rims.iter().map(|r| r.cover.lying * r.edge.length()).sum();
+        let length: f64 = self.rims.iter().map(|rim| rim.edge.length()).sum();
         let whole: f64 = trace(&bare).iter().map(|opening| opening.area(&bare)).sum();
-        whole > PANEL_SHARE * area
+        whole > PANEL_SHARE * area && lying < LYING_SHARE * length
     }
 
     /// Fills an opening if its rim closes by itself.
     fn close(&mut self, opening: &Opening, added: &mut Added) -> Result<(), StoreError> {
-        if opening.widest_jump > 0.0 || opening.steps.len() < 3 {
+        let [held, _] = opening.held(self.rims);
+        if opening.widest_jump > 0.0 || opening.steps.len() < 3 || held > 0.5 {
             let lengths = opening.steps.iter().map(|step| self.rims[step.rim].open_length());
             self.stats.patched_length += lengths.sum::<f64>();
             return Ok(());

@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::bridge::MendOptions;
-use crate::bridge::contacts::{BY_FACE, Contact};
+use crate::bridge::contacts::{Contact, LYING, ON_FACE};
 use crate::bridge::rims::{HELD, RimEdge};
 use crate::bridge::samples::samples_of;
 use crate::bridge::sheets::Sheets;
@@ -59,6 +59,18 @@ impl Measure {
     }
 }
 
+/// Shares of a rim edge, 0 to 1. 24 bytes.
+#[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
+#[repr(C)]
+pub struct Cover {
+    /// Other rims face it.
+    pub faced: f64,
+    /// It ends on a face.
+    pub on_face: f64,
+    /// It lies on a face.
+    pub lying: f64,
+}
+
 /// What becomes of a sheet.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fate {
@@ -96,8 +108,7 @@ impl Record for RimOfShell {
 pub struct Shells<'d> {
     pub domain: &'d Domain,
     measures: Table<Measure>,
-    /// Of each rim edge the share that is covered.
-    covered: Table<f64>,
+    covers: Table<Cover>,
     /// By shell.
     rims: Option<Sorter<RimOfShell>>,
     thickness: f64,
@@ -115,27 +126,36 @@ impl<'d> Shells<'d> {
     ) -> Result<Self, StoreError> {
         let (scratch, share_bytes) = (resources.scratch, resources.share_bytes / 8);
         let mut unite = Unite::new(scratch, share_bytes, sheets.count())?;
-        let mut covered = Table::new(scratch, share_bytes);
+        let mut covers = Table::new(scratch, share_bytes);
         let mut contacts = contacts.finish()?;
         let mut next = contacts.next()?;
         let mut reader = rims.reader(0, rims.len());
         while let Some(block) = reader.next_block()? {
             for rim in block {
-                let number = covered.len() as u32;
-                let (mut count, mut last) = (0, None);
+                let number = covers.len() as u32;
+                let all = f64::from(samples_of(rim.length(), domain.cell_size()));
+                let mut cover = Cover::default();
+                let mut last = None;
                 while let Some(contact) = next
                     && contact.rim == number
                 {
-                    count += u32::from(last != Some(contact.index));
+                    // Of one sample those of rims come first, then the face that it lies on.
+                    let share = if last == Some(contact.index) { 0.0 } else { 1.0 / all };
                     last = Some(contact.index);
-                    if contact.sheet != BY_FACE {
-                        unite.unite(rim.sheet, contact.sheet)?;
+                    match contact.sheet {
+                        ON_FACE => cover.on_face += share,
+                        LYING => cover.lying += share,
+                        sheet => {
+                            cover.faced += share;
+                            unite.unite(rim.sheet, sheet)?;
+                        }
                     }
                     next = contacts.next()?;
                 }
-                let all = samples_of(rim.length(), domain.cell_size());
-                let share = f64::from(count) / f64::from(all);
-                covered.push(if rim.flags & HELD == 0 { share } else { 1.0 })?;
+                if rim.flags & HELD != 0 {
+                    cover.on_face = 1.0;
+                }
+                covers.push(cover)?;
             }
         }
         let mut labels = unite.finish()?;
@@ -154,7 +174,7 @@ impl<'d> Shells<'d> {
             measures.push(Measure::default())?;
         }
         let (rims, thickness) = (Some(by_shell), options.thickness);
-        Ok(Self { domain, measures, covered, rims, thickness })
+        Ok(Self { domain, measures, covers, rims, thickness })
     }
 
     /// Measures the sheets.
@@ -186,9 +206,9 @@ impl<'d> Shells<'d> {
         self.rims.take()
     }
 
-    /// The share of a rim edge that is covered.
-    pub fn covered(&mut self, rim: u32) -> Result<f64, StoreError> {
-        self.covered.get(rim.into())
+    /// What covers a rim edge.
+    pub fn cover(&mut self, rim: u32) -> Result<Cover, StoreError> {
+        self.covers.get(rim.into())
     }
 
     /// The measures of the sheets with these numbers, together.
@@ -201,8 +221,8 @@ impl<'d> Shells<'d> {
     }
 
     /// Makes walls of the sheets of a shell: behind the side that looks out where the shell holds a
-    /// volume, else on both sides.
-    pub fn wall(&mut self, sheets: &[u32]) -> Result<(), StoreError> {
+    /// volume and stands free, else on both sides.
+    pub fn wall(&mut self, sheets: &[u32], is_free: bool) -> Result<(), StoreError> {
         let shell = self.together(sheets)?;
         let about = DVec3::from(shell.moment) / shell.area;
         let mut height = 0.0;
@@ -210,7 +230,7 @@ impl<'d> Shells<'d> {
             height += self.measures.get(sheet.into())?.height_about(about).abs();
         }
         // Thinner than two walls, it holds none.
-        let is_hollow = height > 2.0 * self.thickness * shell.area;
+        let is_hollow = is_free && height > 2.0 * self.thickness * shell.area;
         for &sheet in sheets {
             let mut measure = self.measures.get(sheet.into())?;
             let fate = match measure.height_about(about) {

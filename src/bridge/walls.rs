@@ -187,13 +187,14 @@ impl Builder {
 }
 
 /// The two faces of a wall.
-struct Slab {
+pub struct Slab {
     low: [DVec3; 3],
     high: [DVec3; 3],
 }
 
 impl Slab {
-    fn new(
+    /// The faces of a triangle's wall, so far from it along its miters; they stay in `room`.
+    pub fn new(
         triangle: &SoupTriangle,
         miters: [DVec3; 3],
         [low, high]: [f64; 2],
@@ -207,7 +208,7 @@ impl Slab {
 
     /// Pushes both faces, and the ends at the edges that have one. The high face looks up the
     /// sheet's side.
-    fn push(
+    pub fn push(
         &self,
         has_end: [bool; 3],
         is_turned: bool,

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use brickmend::contour::Method;
 use brickmend::ingest::SheetRule;
-use brickmend::repair::{Depth, Length, Limits, MaxHole, Reach, Settings};
+use brickmend::repair::{Depth, Length, Limits, MaxHole, Reach, Settings, ThinRule};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
 
@@ -29,6 +29,9 @@ pub struct ResultArguments {
     /// What becomes of sheets without thickness.
     #[arg(long, value_enum, default_value_t = SheetRuleName::Thicken)]
     sheets: SheetRuleName,
+    /// What becomes of walls thinner than a cell.
+    #[arg(long, value_enum, default_value_t = ThinRuleName::Thicken)]
+    thin: ThinRuleName,
     /// Thickness of the walls that sheets without thickness become; in cells (2cells), model units,
     /// or % of the bounding box diagonal.
     #[arg(long, value_name = "LENGTH", default_value = "2cells", value_parser = parse_length)]
@@ -94,6 +97,14 @@ enum SheetRuleName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ThinRuleName {
+    /// They become as thick as sheets do.
+    Thicken,
+    /// They go where the grid misses them, and are counted.
+    Drop,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MethodName {
     /// Manifold dual contouring: creases and corners stay sharp.
     Mdc,
@@ -134,6 +145,10 @@ impl ResultArguments {
             SheetRuleName::Remove => SheetRule::Remove,
             SheetRuleName::KeepFins => SheetRule::KeepFins,
         };
+        let thin = match self.thin {
+            ThinRuleName::Thicken => ThinRule::Thicken,
+            ThinRuleName::Drop => ThinRule::Drop,
+        };
         let (max_hole, max_gap) = (self.max_hole, self.max_gap);
         let sheet_thickness = self.sheet_thickness;
         let (crease_deg, strict) = (self.crease, self.strict);
@@ -143,6 +158,7 @@ impl ResultArguments {
             depth,
             fill_rule,
             sheets,
+            thin,
             max_hole,
             max_gap,
             sheet_thickness,

@@ -21,14 +21,14 @@ pub struct FlipRecord {
     pub edge: u32,
     /// Where the patch crosses the edge, in 1/65536.
     pub offset: u16,
-    /// 1 where it closes a crack: an opening of few faces.
-    pub at_crack: u16,
+    /// Zero.
+    pub unused: u16,
 }
 
 impl Record for FlipRecord {
-    type Key = (u64, u32, u16, u16);
+    type Key = (u64, u32, u16);
     fn key(&self) -> Self::Key {
-        (self.brick, self.edge, self.offset, self.at_crack)
+        (self.brick, self.edge, self.offset)
     }
 }
 
@@ -44,9 +44,8 @@ pub struct Flip {
 }
 
 impl Flip {
-    /// The edge in each of the one, two or four bricks that hold it; `at_crack` says whether it
-    /// closes an opening of few faces.
-    pub fn in_bricks(self, at_crack: bool) -> impl Iterator<Item = FlipRecord> {
+    /// The edge in each of the one, two or four bricks that hold it.
+    pub fn in_bricks(self) -> impl Iterator<Item = FlipRecord> {
         let side = SIDE as u32;
         let (u, v) = ((self.axis + 1) % 3, (self.axis + 2) % 3);
         (0..4_u32).filter_map(move |combination| {
@@ -63,8 +62,7 @@ impl Flip {
             }
             let brick = BrickKey::new(position).0;
             let edge = edge_index(self.axis, local);
-            let at_crack = u16::from(at_crack);
-            Some(FlipRecord { brick, edge, offset: self.offset, at_crack })
+            Some(FlipRecord { brick, edge, offset: self.offset, unused: 0 })
         })
     }
 }

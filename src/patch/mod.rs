@@ -103,9 +103,6 @@ pub fn patch(
 /// What a byte of a record takes while its odd faces are found and closed.
 const RECORD_FACTOR: u64 = 3;
 
-/// An opening of no more odd faces is a crack, however the sheet around it lies.
-const CRACK_FACES: usize = 16;
-
 /// Faces of components that reach a brick border, with the labels that their bricks gave them.
 struct BorderFaces {
     faces: Sorter<ComponentFace>,
@@ -173,9 +170,8 @@ fn solve_inside(found: LocalComponents, solver: &mut Solver) -> Result<SolvedBri
     let mut flips = Vec::new();
     let mut openings = Vec::new();
     for component in found.inner {
-        let at_crack = component.len() <= CRACK_FACES;
         openings.push(solver.solve(&component, &mut |flip| {
-            flips.extend(flip.in_bricks(at_crack));
+            flips.extend(flip.in_bricks());
             Ok(())
         })?);
     }
@@ -227,27 +223,26 @@ fn solve_components(
 ) -> Result<(), PatchError> {
     let solver = Solver::new(resources.scratch, resources.share_bytes / 4);
     let mut sorted = faces.finish()?;
-    let mut component: Option<(u32, Sorter<OddFace>, usize)> = None;
+    let mut component: Option<(u32, Sorter<OddFace>)> = None;
     loop {
         let face = sorted.next()?;
         let label = face.map(|face| face.label);
         if component.as_ref().map(|open| open.0) != label
-            && let Some((_, faces, count)) = component.take()
+            && let Some((_, faces)) = component.take()
         {
             if resources.monitor.cancelled() {
                 return Err(StoreError::Cancelled.into());
             }
             let opening = solver.solve_sorted(faces.finish()?, &mut |flip| {
-                flip.in_bricks(count <= CRACK_FACES).try_for_each(|record| flips.push(record))
+                flip.in_bricks().try_for_each(|record| flips.push(record))
             })?;
             stats.border_components += 1;
             stats.add(opening);
         }
         let Some(face) = face else { return Ok(()) };
-        let (_, faces, count) = component.get_or_insert_with(|| {
-            (face.label, Sorter::new(resources.scratch, resources.share_bytes / 8), 0)
+        let (_, faces) = component.get_or_insert_with(|| {
+            (face.label, Sorter::new(resources.scratch, resources.share_bytes / 8))
         });
         faces.push(face.face)?;
-        *count += 1;
     }
 }

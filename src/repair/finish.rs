@@ -34,7 +34,6 @@ pub fn conclude(
     let cell_volume = domain.cell_size().powi(3);
     let invented = Invented {
         patch_polygons: findings.sign.patch_crossings,
-        sheet_corners: findings.sign.sheet_corners,
         filled_volume: findings.sign.filled_cells as f64 * cell_volume,
         sealed_by_resolution_volume: findings.sign.sealed_by_resolution_cells as f64 * cell_volume,
         largest_openings: findings.patch.largest.clone(),
@@ -79,6 +78,7 @@ pub fn conclude(
             caveat: run.settings.method.caveat().map(str::to_owned),
         },
         mend: findings.mend.clone(),
+        thickened: findings.thickened,
         scan: findings.scan,
         patch: findings.patch.clone(),
         sign: findings.sign,
@@ -156,16 +156,17 @@ fn reasons(
             walled * 100.0
         ));
     }
+    let thickened = findings.thickened.area / findings.measure.area.max(f64::MIN_POSITIVE);
+    if thickened > WALLED_AREA_SHARE {
+        reasons.push(format!(
+            "{:.0} % of the area belongs to walls thinner than a cell, which became thicker",
+            thickened * 100.0
+        ));
+    }
     if findings.mend.crowded_rims > 0 {
         reasons.push(format!(
             "{} edges are open in places with too many of them to tell holes; the patch closed them",
             findings.mend.crowded_rims
-        ));
-    }
-    if invented.sheet_corners > 0 {
-        reasons.push(format!(
-            "Open sheets became plates of about a cell: {} corners of the grid lie behind them",
-            invented.sheet_corners
         ));
     }
     if invented.filled_volume > FILLED_VOLUME_SHARE * proof.volume {

@@ -37,6 +37,17 @@ impl Depth {
     pub const DEFAULT_MAX: u32 = 10;
 }
 
+/// What becomes of walls thinner than a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ThinRule {
+    /// They become as thick as sheets do.
+    #[default]
+    Thicken,
+    /// They go where the grid misses them.
+    Drop,
+}
+
 /// Which openings are filled; the others are wanted, and what they open into gets walls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -71,6 +82,8 @@ pub struct Settings {
     pub fill_rule: FillRule,
     /// What becomes of sheets without thickness.
     pub sheets: SheetRule,
+    /// What becomes of walls thinner than a cell.
+    pub thin: ThinRule,
     /// Which openings are filled.
     pub max_hole: MaxHole,
     /// Rims that are no farther apart than this face each other across a crack.
@@ -96,6 +109,7 @@ impl Default for Settings {
             depth: Depth::DEFAULT,
             fill_rule: FillRule::Solid,
             sheets: SheetRule::Thicken,
+            thin: ThinRule::Thicken,
             max_hole: MaxHole::Auto,
             max_gap: Reach::Cells(2.0),
             sheet_thickness: Reach::Cells(2.0),

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::bridge::{HoleRule, MendOptions, MendStats, Mended, mend};
+use crate::bridge::{HoleRule, MendOptions, MendStats, Mended, ThickenStats, mend, thicken};
 use crate::contour::{
     CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
     write_surface,
@@ -23,12 +23,12 @@ use crate::repair::finish::broken_promises;
 use crate::repair::length::Reach;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
-use crate::repair::settings::MaxHole;
+use crate::repair::settings::{MaxHole, ThinRule};
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
-use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
-use crate::store::{BrickFile, FileState, Resources, StoreError};
+use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, find_lost, flood};
+use crate::store::{BrickFile, FileState, NoCheckpoints, Resources, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
 
 /// A level of detail whose file is in its place.
@@ -52,6 +52,7 @@ pub struct Findings {
     pub bins: u64,
     pub settle: SettleStats,
     pub mend: MendStats,
+    pub thickened: ThickenStats,
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub sign: SignStats,
@@ -128,6 +129,7 @@ impl Run<'_> {
             Step::Scan => scan_bins(workspace, findings, handles, resources)?,
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
             Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
+            Step::Thicken => self.thicken(workspace, findings, handles, resources)?,
             Step::Sign => self.sign(workspace, findings, handles, resources)?,
             Step::Choose => self.choose(workspace, findings, handles, resources)?,
             Step::Place => self.place(workspace, findings, handles, resources)?,
@@ -145,7 +147,7 @@ impl Run<'_> {
             Step::Read => std::fs::metadata(self.input).map_or(0, |file| file.len()),
             Step::Bin => findings.soup().stats.triangles,
             Step::Settle | Step::Scan => findings.bins,
-            Step::Mend => 0,
+            Step::Mend | Step::Thicken => 0,
             Step::Patch => findings.scan.open_bricks,
             Step::Flood | Step::Sign => findings.scan.bricks,
             Step::Choose if self.settings.max_triangles.is_some() => {
@@ -234,6 +236,54 @@ impl Run<'_> {
         let (mended, stats) = mend(&soup, &options, findings.domain(), triangles, resources)?;
         findings.mend = stats;
         Ok(mended.files())
+    }
+
+    /// Thickens what would be lost, and makes hits, flips and flood anew with it.
+    fn thicken(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        findings.thickened = ThickenStats::default();
+        if self.settings.thin == ThinRule::Drop {
+            return Ok(Vec::new());
+        }
+        let files = workspace.files();
+        let domain = *findings.domain();
+        let lost = {
+            let flips = Flips::open(resources, &files)?;
+            let flooded = Flooded::open(resources, &files)?;
+            let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
+            find_lost(hits, &flips, &flooded, resources).map_err(RepairError::Sign)?
+        };
+        if lost.is_empty() {
+            return Ok(Vec::new());
+        }
+        let bins = Bins::open(resources, &files, findings.left_out)?;
+        let mended = Mended::open(resources, &files)?;
+        let soup = mended.soup(bins.spools());
+        let options = self.mend_options(findings)?;
+        let given = findings.soup().stats.triangles;
+        let numbers = (given, given + findings.mend.added_triangles);
+        let found = thicken(&soup, lost, &options, &domain, numbers, resources)?;
+        let Some((thickened, stats)) = found else { return Ok(Vec::new()) };
+        findings.thickened = stats;
+        // Made anew as a whole: what is noted on the way belongs to the steps of before.
+        let resources = &Resources { checkpoints: &NoCheckpoints, ..*resources };
+        handles.hits = None;
+        let (hits, stats) = scan(&thickened.soup(&soup), &domain, resources)?;
+        findings.scan = stats;
+        let cell_units = f64::from(domain.cell_units);
+        let (flips, stats) =
+            patch(&hits, HAS_ODD_FACES, cell_units, resources).map_err(RepairError::Patch)?;
+        findings.patch = stats;
+        let flooded = flood(&hits, &flips, &domain, resources).map_err(RepairError::Sign)?;
+        let mut files = hand_on(hits, &mut handles.hits);
+        files.push(flips.state().clone());
+        files.extend(flooded.files());
+        Ok(files)
     }
 
     fn mend_options(&self, findings: &Findings) -> Result<MendOptions, RepairError> {

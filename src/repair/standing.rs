@@ -13,10 +13,12 @@ use crate::store::Manifest;
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 8] = [
+pub const PASSING: [&str; 10] = [
     "facts.spool",
     bridge::PASSING[0],
     bridge::PASSING[1],
+    bridge::THICKENED[0],
+    bridge::THICKENED[1],
     "faces.spool",
     "even.spool",
     FACES,

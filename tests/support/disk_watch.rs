@@ -13,7 +13,7 @@ const NEEDED: [(Stage, &[&str]); 7] = [
     (Stage::Bridge, &["attributes", "bins", "drops", "borders", "rims", "leftout", "added"]),
     (Stage::Scan, &["attributes", "bins", "leftout", "added", "hits"]),
     (Stage::Patch, &["attributes", "bins", "leftout", "added", "hits", "faces", "flips"]),
-    (Stage::Sign, &["attributes", "hits", "flips", "even", "sheets", "signs"]),
+    (Stage::Sign, &["attributes", "bins", "leftout", "added", "hits", "flips", "even", "signs"]),
     (Stage::Contour, &["attributes", "hits", "flips", "signs", "cells", "output"]),
     (Stage::Verify, &["attributes", "cells", "output"]),
 ];
