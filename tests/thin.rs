@@ -25,7 +25,7 @@ fn a_plate_far_thinner_than_a_cell_stays_whole() {
             let (parts, euler) = (surface.proof.components, surface.proof.euler_characteristic);
             assert!(parts <= 12 && euler == 2 * parts as i64, "{cells}, {pose}: {parts} {euler}");
             let told = surface.proof.volume / outcome.cell_size;
-            assert!(told > cells * 0.8 && told < cells + 2.6, "{cells} cells: {told}");
+            assert!(told > cells * 0.6 && told < cells + 2.6, "{cells} cells: {told}");
             assert_eq!(outcome.thickened.triangles > 0, cells < 1.0, "{cells} cells");
         }
     }

@@ -8,13 +8,16 @@
 //! Memory:  the share; a brick per worker.
 
 use crate::octree::{
-    ArchivedHitBrick, Flips, HitEdge, LINES, LostHits, ROWS, Regions, SIDE, decode_hits,
-    edge_position, find_regions,
+    ArchivedHitBrick, Flips, HitEdge, LINES, LostHits, ROWS, Regions, SIDE, SourcePlane,
+    decode_hits, edge_position, find_regions,
 };
 use crate::sign::SignError;
 use crate::sign::flooded::{Flooded, OUTSIDE};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::store::{BrickFile, Resources, Sorter, ordered_by_weight};
+
+/// Cosine of the angle between the sides of a wall: its edge is sharper than any ridge.
+const PARALLEL: f64 = 0.8;
 
 /// Corners of the largest speck.
 const SPECK_CORNERS: u32 = 8;
@@ -78,6 +81,18 @@ fn find_specks(regions: &Regions) -> Vec<bool> {
     corners.into_iter().map(|count| count <= SPECK_CORNERS).collect()
 }
 
+/// Whether the first and the last hit lie on planes that could be the sides of a wall. Those of a
+/// ridge are no loss: every ridge passes edges whose ends are both outside.
+fn are_parallel(brick: &ArchivedHitBrick, hits: &[rkyv::rend::u32_le]) -> bool {
+    let (Some(first), Some(last)) = (hits.first(), hits.last()) else { return false };
+    let normal = |hit: &rkyv::rend::u32_le| {
+        SourcePlane::from(&brick.planes[hit.to_native() as usize]).normal.map(f64::from)
+    };
+    let (a, b) = (normal(first), normal(last));
+    let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    cosine.abs() >= PARALLEL
+}
+
 fn lost_of(brick: &ArchivedHitBrick, is_outside: impl Fn([usize; 3]) -> bool) -> Vec<LostHits> {
     let mut counts = vec![0_u32; brick.planes.len()];
     let mut first = 0;
@@ -88,8 +103,10 @@ fn lost_of(brick: &ArchivedHitBrick, is_outside: impl Fn([usize; 3]) -> bool) ->
         let (axis, at) = edge_position(edge.edge());
         let mut beyond = at;
         beyond[axis] += 1;
-        if at.iter().all(|&c| c < SIDE) && is_outside(at) && is_outside(beyond) {
-            for hit in &brick.hits[hits] {
+        let hits = &brick.hits[hits];
+        let is_lost = at.iter().all(|&c| c < SIDE) && is_outside(at) && is_outside(beyond);
+        if is_lost && are_parallel(brick, hits) {
+            for hit in hits {
                 counts[hit.to_native() as usize] += 1;
             }
         }
