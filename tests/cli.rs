@@ -164,7 +164,8 @@ fn a_budget_below_the_floor_is_refused_with_the_number_needed() {
 fn a_model_thinner_than_a_cell_ends_with_4_and_a_reason() {
     let folder = folder();
     let input = model("testdata/defects/thin_plate/model.obj");
-    let (code, out, err) = repair(&input, &folder.path().join("out.ply"), &["--depth", "5"]);
+    let (code, out, err) =
+        repair(&input, &folder.path().join("out.ply"), &["--depth", "5", "--thin", "drop"]);
     assert_eq!(code, 4, "{err}");
     assert_eq!(out, "");
     assert!(err.contains("thinner than a cell"), "{err}");
@@ -206,11 +207,11 @@ fn json_stands_alone_on_stdout() {
     let json: serde_json::Value = serde_json::from_str(&out).expect("stdout is JSON");
     assert_eq!(json["schema"], 1);
     assert_eq!(json["output"]["proof"]["boundary_edges"], 0);
-    assert_eq!(json["found"]["openings"], 1);
+    assert_eq!(json["mend"]["filled_holes"], 1);
     let size = std::fs::metadata(&output).expect("the output is there").len();
     assert_eq!(json["output"]["bytes"], size);
     assert!(json["memory"]["peak_bytes"].as_u64().is_some_and(|bytes| bytes > 1 << 20));
-    for stage in ["ingest", "scan", "patch", "sign", "contour", "verify"] {
+    for stage in ["ingest", "bridge", "scan", "patch", "sign", "contour", "verify"] {
         assert!(json["stages"][stage]["seconds"].is_f64(), "{stage}");
     }
 }
@@ -262,7 +263,7 @@ fn an_old_output_stays_until_a_new_one_is_proved() {
     let output = folder.path().join("out.ply");
     std::fs::write(&output, "what was there before").expect("writable");
     let thin = model("testdata/defects/thin_plate/model.obj");
-    let (code, ..) = repair(&thin, &output, &["--depth", "5"]);
+    let (code, ..) = repair(&thin, &output, &["--depth", "5", "--thin", "drop"]);
     assert_eq!(code, 4);
     assert_eq!(std::fs::read(&output).expect("there"), b"what was there before");
     let (code, _, err) = repair(&model(CUBE), &output, &["--depth", "4"]);

@@ -52,7 +52,7 @@ fn measured(input: &Path, name: &str, settings: &Settings, limits: &Limits) -> (
 }
 
 #[test]
-fn leaves_of_closed_models_are_told_to_a_tenth_and_of_others_to_a_half() {
+fn leaves_of_closed_models_are_told_to_a_tenth_and_of_others_to_a_factor_of_two() {
     for model in MODELS {
         for depth in 5..=8 {
             let settings = at_depth(depth);
@@ -61,8 +61,9 @@ fn leaves_of_closed_models_are_told_to_a_tenth_and_of_others_to_a_half() {
                 measured(&testdata(model), "out.ply", &settings, &limits(BUDGETS[1]));
             let ratio = told.leaf_cells as f64 / outcome.scan.leaf_cells as f64;
             let closed = model.contains("cube");
-            // The cabinet has doubled panels, which count once, and thin ones, which cancel out.
-            let range = if closed { 0.9..1.1 } else { 0.75..1.5 };
+            // The cabinet has doubled panels, which count once, and thin ones, which cancel out. The
+            // bowl becomes a wall, which has two faces and an end.
+            let range = if closed { 0.9..1.1 } else { 0.4..1.5 };
             assert!(range.contains(&ratio), "{model} at {depth}: {ratio}");
             assert_eq!(closed, told.input.rims.edges == 0.0, "{model}");
         }
@@ -276,8 +277,13 @@ fn the_documentation_names_every_field_and_no_other() {
     assert!(told.input.bounds != SnapBox::EMPTY);
     let check = |told: &Estimate| {
         let json = serde_json::to_value(told).expect("plain data is always JSON");
-        let conditional =
-            ["settings.depth.levels", "settings.depth.tolerance", "settings.decimate.length"];
+        let conditional = [
+            "settings.depth.levels",
+            "settings.depth.tolerance",
+            "settings.decimate.length",
+            "settings.max_gap.length",
+            "settings.sheet_thickness.length",
+        ];
         let lengths = ["model", "percent", "metres"]
             .map(|unit| format!("settings.depth.tolerance.length.{unit}"));
         let inner = ["settings.depth.tolerance.length", "settings.depth.tolerance.max_depth"];

@@ -4,11 +4,11 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use brickmend::geom::morton;
-use brickmend::ingest::{AttributeRecord, BinEntry};
+use brickmend::ingest::AttributeRecord;
 use brickmend::octree::{
-    AXIS_EDGES, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick, FlipRecord, HitBrick,
-    HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle, SourcePlane, TRANSPARENT,
-    decode_cells, decode_edges, decode_hits, decode_signs, edge_index, encode,
+    AXIS_EDGES, BinEntry, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick, FlipRecord,
+    HitBrick, HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle, SourcePlane,
+    TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index, encode,
 };
 use brickmend::scan::HAS_ODD_FACES;
 use brickmend::store::{

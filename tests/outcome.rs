@@ -10,7 +10,7 @@ use support::schema::check_document;
 use support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 20] = [
+const CONDITIONAL: [&str; 38] = [
     "input.dense_box.lo",
     "input.dense_box.hi",
     "settings.depth.tolerance",
@@ -20,6 +20,24 @@ const CONDITIONAL: [&str; 20] = [
     "settings.depth.tolerance.length.metres",
     "settings.depth.tolerance.max_depth",
     "settings.depth.levels",
+    "settings.max_hole.size",
+    "settings.max_hole.size.cells",
+    "settings.max_hole.size.length",
+    "settings.max_gap.cells",
+    "settings.max_gap.length",
+    "settings.sheet_thickness.cells",
+    "settings.sheet_thickness.length",
+    "mend.widest_holes[]",
+    "mend.widest_holes[].lo",
+    "mend.widest_holes[].hi",
+    "mend.widest_holes[].area",
+    "mend.widest_holes[].edges",
+    "invented.largest_openings[].odd_faces",
+    "invented.largest_openings[].lo_cell",
+    "invented.largest_openings[].hi_cell",
+    "patch.largest[].odd_faces",
+    "patch.largest[].lo_cell",
+    "patch.largest[].hi_cell",
     "settings.decimate.cells",
     "settings.decimate.length",
     "output.proof.places[].kind",

@@ -3,7 +3,7 @@
 mod support;
 
 use brickmend::mesh::shapes::{Corners, Random, cuboid, sphere, volume};
-use brickmend::repair::{Outcome, Settings};
+use brickmend::repair::{MaxHole, Outcome, Settings};
 use brickmend::sign::FillRule;
 
 use crate::support::run::{Encoding, Workshop, at_depth, repair_soup, unclustered};
@@ -96,8 +96,9 @@ fn the_place_in_the_grid_does_not_change_the_volume() {
             let centre = random.point().map(|x| 0.5 + 0.095 * x);
             let mut soup = open_sphere(centre, radius, top);
             soup.extend(specks());
-            let (outcome, surface) = repair_soup(&soup, &at_depth(6)).expect("a result");
-            assert_eq!(outcome.patch.odd_faces == 0, top > 1.0);
+            let settings = Settings { max_hole: MaxHole::All, ..at_depth(6) };
+            let (outcome, surface) = repair_soup(&soup, &settings).expect("a result");
+            assert_eq!(outcome.mend.filled_holes == 0, top > 1.0);
             let found = surface.proof.volume;
             let disc = std::f64::consts::PI * radius * radius * (1.0 - top * top).max(0.0);
             // A hundredth, and half a cell over the patch.

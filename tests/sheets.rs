@@ -52,7 +52,7 @@ fn a_fin_goes_and_leaves_the_box_as_if_it_had_never_been() {
         let (outcome, surface) = with_rule(&soup, SheetRule::Thicken, 6);
         assert_eq!(outcome.found.settle.fins.fins, 2, "pose {pose}");
         assert_eq!(outcome.found.settle.fins.triangles, 4);
-        assert_eq!((outcome.invented.sheet_corners, outcome.patch.odd_faces), (0, 0));
+        assert_eq!((outcome.thickened.triangles, outcome.patch.odd_faces), (0, 0));
         let volume = 8.0 * scale.powi(3);
         assert!((surface.proof.volume / volume - 1.0).abs() < 1e-3, "{}", surface.proof.volume);
         let far = surface.vertices.iter().map(|v| {
@@ -68,7 +68,7 @@ fn a_fin_goes_and_leaves_the_box_as_if_it_had_never_been() {
 fn a_fin_that_is_wanted_becomes_a_plate() {
     let (outcome, surface) = with_rule(&finned_box(), SheetRule::KeepFins, 7);
     assert_eq!(outcome.found.settle.fins.fins, 0);
-    assert!(outcome.invented.sheet_corners > 0);
+    assert_eq!((outcome.mend.walled_shells, outcome.thickened.triangles), (2, 0));
     assert!(surface.proof.volume > 8.0);
 }
 
@@ -92,7 +92,8 @@ fn a_shelf_that_half_of_its_border_holds_is_no_fin() {
     let found = outcome.found.settle;
     assert_eq!((found.rim_edges, found.interface_triangles), (6, 0));
     assert_eq!(found.fins.triangles, 0);
-    assert!(outcome.invented.sheet_corners > 0, "it becomes a plate");
+    let thick = outcome.mend.walled_triangles + outcome.thickened.triangles;
+    assert_eq!(thick, 2, "it becomes a plate");
     assert!(surface.proof.volume > 6.0);
 }
 

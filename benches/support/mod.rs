@@ -11,11 +11,11 @@ use brickmend::mesh::shapes::{
 };
 use brickmend::mesh::{MeshSink, SinkState, SinkStats};
 use brickmend::monitor::Void;
-use brickmend::octree::{BrickKey, Domain, Flips};
+use brickmend::octree::{Domain, Flips};
 use brickmend::patch::patch;
-use brickmend::scan::{HAS_ODD_FACES, ScanItem, ScanStats, scan};
+use brickmend::scan::{HAS_ODD_FACES, ScanStats, scan};
 use brickmend::sign::{FillRule, SignStats, assign_signs, flood};
-use brickmend::store::{Backing, BrickFile, NoCheckpoints, Resources, Scratch, SpoolPeek};
+use brickmend::store::{Backing, BrickFile, NoCheckpoints, Resources, Scratch};
 use glam::DVec3;
 use rayon::ThreadPool;
 use tempfile::TempDir;
@@ -86,19 +86,8 @@ impl Workshop {
     }
 
     pub fn scan(&self, model: &Ingested) -> (BrickFile, ScanStats) {
-        let mut bins = SpoolPeek::new(&model.bins.entries);
-        let mut drops = SpoolPeek::new(&model.settled.drops);
-        let mut next_drop = 0;
-        let next = || {
-            let Some(bin) = bins.next()? else { return Ok(None) };
-            let first_drop = next_drop;
-            next_drop += drops.skip_while(|drop| drop.brick == bin.brick)?;
-            let (brick, drops) = (BrickKey(bin.brick), first_drop..next_drop);
-            Ok(Some(ScanItem { brick, first: bin.first, count: bin.count, drops }))
-        };
-        let resources = self.resources();
-        let (triangles, drops) = (&model.bins.triangles, &model.settled.drops);
-        scan(triangles, drops, next, &model.domain, &resources).expect("scan works")
+        let soup = model.bins.without(&model.settled.drops);
+        scan(&soup, &model.domain, &self.resources()).expect("scan works")
     }
 
     pub fn patch(&self, model: &Ingested, hits: &BrickFile) -> Flips {

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use brickmend::contour::Method;
 use brickmend::ingest::SheetRule;
-use brickmend::repair::{Depth, Length, Limits, Reach, Settings};
+use brickmend::repair::{Depth, Length, Limits, MaxHole, Reach, Settings, ThinRule};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
 
@@ -29,6 +29,20 @@ pub struct ResultArguments {
     /// What becomes of sheets without thickness.
     #[arg(long, value_enum, default_value_t = SheetRuleName::Thicken)]
     sheets: SheetRuleName,
+    /// What becomes of walls thinner than a cell.
+    #[arg(long, value_enum, default_value_t = ThinRuleName::Thicken)]
+    thin: ThinRuleName,
+    /// Thickness of the walls that sheets without thickness become; in cells (2cells), model units,
+    /// or % of the bounding box diagonal.
+    #[arg(long, value_name = "LENGTH", default_value = "2cells", value_parser = parse_length)]
+    sheet_thickness: Reach,
+    /// Which openings are filled: all that are small for their shell (auto), all, or those no wider
+    /// than a length. What the others open into gets walls.
+    #[arg(long, value_name = "auto|all|LENGTH", default_value = "auto")]
+    max_hole: MaxHole,
+    /// Rims closer than this face each other across a crack, which is closed; 0 for none.
+    #[arg(long, value_name = "LENGTH", default_value = "2cells")]
+    max_gap: Reach,
     /// Angle in degrees below which a crease is noise.
     #[arg(long, value_name = "DEGREES", default_value = "12", value_parser = parse_angle)]
     crease: f64,
@@ -83,6 +97,14 @@ enum SheetRuleName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum ThinRuleName {
+    /// They become as thick as sheets do.
+    Thicken,
+    /// They go where the grid misses them, and are counted.
+    Drop,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MethodName {
     /// Manifold dual contouring: creases and corners stay sharp.
     Mdc,
@@ -123,10 +145,29 @@ impl ResultArguments {
             SheetRuleName::Remove => SheetRule::Remove,
             SheetRuleName::KeepFins => SheetRule::KeepFins,
         };
+        let thin = match self.thin {
+            ThinRuleName::Thicken => ThinRule::Thicken,
+            ThinRuleName::Drop => ThinRule::Drop,
+        };
+        let (max_hole, max_gap) = (self.max_hole, self.max_gap);
+        let sheet_thickness = self.sheet_thickness;
         let (crease_deg, strict) = (self.crease, self.strict);
         let (decimate, max_triangles) = (self.decimate, self.max_triangles);
         let method = self.method.into();
-        Settings { depth, fill_rule, sheets, crease_deg, method, decimate, max_triangles, strict }
+        Settings {
+            depth,
+            fill_rule,
+            sheets,
+            thin,
+            max_hole,
+            max_gap,
+            sheet_thickness,
+            crease_deg,
+            method,
+            decimate,
+            max_triangles,
+            strict,
+        }
     }
 }
 
@@ -139,6 +180,14 @@ impl ResourceArguments {
             work_dir: self.work_dir.clone(),
             ..Limits::default()
         }
+    }
+}
+
+fn parse_length(text: &str) -> Result<Reach, String> {
+    match text.parse::<Reach>() {
+        Ok(Reach::Cells(cells)) if cells <= 0.0 => Err("a wall needs a thickness".to_owned()),
+        Ok(length) => Ok(length),
+        Err(error) => Err(error.to_string()),
     }
 }
 

@@ -1,5 +1,6 @@
 //! Exact and small geometry: no files, no threads, no cells.
 
+mod closest;
 mod ear_clipping;
 pub mod morton;
 pub mod orientation;
@@ -8,4 +9,5 @@ pub mod triangle_triangle;
 #[cfg(test)]
 mod triangle_triangle_tests;
 
+pub use closest::closest_on_triangle;
 pub use ear_clipping::EarClipper;

@@ -1,14 +1,14 @@
 //! Second pass: every triangle into the bins of the bricks that it touches.
 
-use bytemuck::{Pod, Zeroable};
-
 use crate::ingest::area::{AreaHistogram, SoupMeasure};
 use crate::ingest::crowds::{CrowdFilter, LeftOut};
 use crate::ingest::soup::Soup;
-use crate::ingest::touch::for_each_touched_brick;
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{BinTriangle, Domain, SoupTriangle};
-use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
+use crate::octree::{
+    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupTriangle,
+    for_each_touched_brick, write_bins,
+};
+use crate::store::{FileState, Resources, Sorter, Spool, StoreError, ordered};
 
 /// Spool of the binned triangles, by brick and source number.
 pub const BINS: &str = "bins.spool";
@@ -16,18 +16,6 @@ pub const BINS: &str = "bins.spool";
 pub const BIN_ENTRIES: &str = "bins.entries";
 /// Triangles per work item.
 const ITEM_TRIANGLES: usize = 2048;
-
-/// Where the triangles of a brick lie.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
-#[repr(C)]
-pub struct BinEntry {
-    /// Key of the brick.
-    pub brick: u64,
-    /// First triangle in the spool.
-    pub first: u64,
-    /// How many.
-    pub count: u64,
-}
 
 /// The bins of all bricks.
 pub struct Bins {
@@ -54,6 +42,18 @@ impl Bins {
             entries: Spool::open(resources.scratch, FileState::find(files, BIN_ENTRIES)?)?,
             left_out,
         })
+    }
+
+    /// The soup without what `drops` leaves out.
+    #[must_use]
+    pub fn without<'b>(&'b self, drops: &'b Spool<DropRecord>) -> BinnedSoup<'b> {
+        BinnedSoup { bins: self.spools(), drops, added: None }
+    }
+
+    /// The bins as they are.
+    #[must_use]
+    pub fn spools(&self) -> BinSpools<'_> {
+        BinSpools { triangles: &self.triangles, entries: &self.entries }
     }
 
     /// The files, as they have to be found again.
@@ -110,31 +110,6 @@ pub fn fill_bins(
         },
         |(binned, _held)| sorter.extend(&binned),
     )?;
-    let mut bins = write_bins(sorter, resources)?;
-    bins.left_out = filter.left_out();
-    Ok((bins, histogram.finish()))
-}
-
-fn write_bins(sorter: Sorter<BinTriangle>, resources: &Resources) -> Result<Bins, StoreError> {
-    let mut triangles = SpoolWriter::create(resources.scratch, BINS)?;
-    let mut entries = SpoolWriter::create(resources.scratch, BIN_ENTRIES)?;
-    let mut sorted = sorter.finish()?;
-    let mut open: Option<BinEntry> = None;
-    while let Some(binned) = sorted.next()? {
-        match &mut open {
-            Some(entry) if entry.brick == binned.brick => entry.count += 1,
-            _ => {
-                if resources.monitor.cancelled() {
-                    return Err(StoreError::Cancelled);
-                }
-                let first = triangles.len();
-                let entry = BinEntry { brick: binned.brick, first, count: 1 };
-                open.replace(entry).map_or(Ok(()), |done| entries.push(done))?;
-            }
-        }
-        triangles.push(binned.triangle)?;
-    }
-    open.map_or(Ok(()), |done| entries.push(done))?;
-    let (triangles, entries) = (triangles.finish()?, entries.finish()?);
-    Ok(Bins { triangles, entries, left_out: LeftOut::default() })
+    let (triangles, entries) = write_bins(sorter, [BINS, BIN_ENTRIES], resources)?;
+    Ok((Bins { triangles, entries, left_out: filter.left_out() }, histogram.finish()))
 }

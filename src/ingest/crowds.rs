@@ -9,7 +9,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ingest::packed::{Given, given_corners, is_degenerate, mix, snapped};
+use crate::ingest::packed::{Given, given_corners, mix};
+use crate::octree::points::{is_degenerate, snapped};
 use crate::octree::{Domain, SoupTriangle};
 
 /// Triangles that are remembered. A power of two.

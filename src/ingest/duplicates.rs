@@ -17,12 +17,12 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::bins::Bins;
 use crate::ingest::examine::Examiner;
 use crate::ingest::facts::{
-    Copied, Fact, JOINED, Outbox, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, counts_once,
+    Copied, Fact, JOINED, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, counts_once,
 };
 use crate::ingest::fins::FinStats;
 use crate::octree::{Domain, DropRecord};
 use crate::store::{
-    FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
+    FileState, Outbox, Resources, Sorter, Spool, SpoolWriter, StoreError, Table, Unite, ordered,
 };
 
 /// Spool of the triangles that do not count.

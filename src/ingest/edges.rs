@@ -5,18 +5,10 @@
 //! Memory:  one edge is counted at a time, however many triangles meet it.
 
 use crate::ingest::duplicates::SettleStats;
-use crate::ingest::facts::{
-    Fact, JOINED, Outbox, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, RIM_ODD,
-};
-use crate::ingest::packed::{EdgeUse, NO_GROUP, NO_WIDTH, Point, unpack_ends};
-use crate::store::{Sorter, StoreError};
-
-/// The length of an edge in model units, for lattice units of `unit`.
-pub(crate) fn length_of(ends: [Point; 2], unit: f64) -> f64 {
-    let square: f64 =
-        (0..3).map(|a| f64::from(ends[0][a]) - f64::from(ends[1][a])).map(|d| d * d).sum();
-    square.sqrt() * unit
-}
+use crate::ingest::facts::{Fact, JOINED, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, RIM_ODD};
+use crate::ingest::packed::{EdgeUse, NO_GROUP, NO_WIDTH};
+use crate::octree::points::{length_of, unpack_ends};
+use crate::store::{Outbox, Sorter, StoreError};
 
 impl SettleStats {
     /// Counts an edge that an odd number of triangles meets.

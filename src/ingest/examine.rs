@@ -5,16 +5,16 @@
 //! Memory:  the bin's keys while it is small; beyond, the share of a worker. Copies are streamed,
 //!          however many there are of one triangle.
 
-use crate::ingest::bins::{BinEntry, Bins};
+use crate::ingest::bins::Bins;
 use crate::ingest::duplicates::SettleStats;
-use crate::ingest::edges::{judge_edges, length_of};
-use crate::ingest::facts::{Copied, DIFFERS, Fact, Outbox};
+use crate::ingest::edges::judge_edges;
+use crate::ingest::facts::{Copied, DIFFERS, Fact};
 use crate::ingest::packed::{
-    EdgeUse, KeySet, Member, NO_GROUP, NO_WIDTH, Point, Triple, given_edge, given_triangle,
-    is_degenerate, pack_corners, pack_ends, snapped, unpack_ends,
+    EdgeUse, KeySet, Member, NO_GROUP, NO_WIDTH, Triple, given_edge, given_triangle, pack_corners,
 };
-use crate::octree::{BrickKey, Domain, SoupTriangle};
-use crate::store::{Scratch, Sorter, StoreError};
+use crate::octree::points::{is_degenerate, length_of, owner, pack_ends, snapped, unpack_ends};
+use crate::octree::{BinEntry, Domain, SoupTriangle};
+use crate::store::{Outbox, Scratch, Sorter, StoreError};
 
 /// Where a worker puts what it finds, and what it may use.
 pub(crate) struct Examiner<'e> {
@@ -25,12 +25,6 @@ pub(crate) struct Examiner<'e> {
     pub(crate) share_bytes: u64,
     pub(crate) copies: Outbox<'e, Copied>,
     pub(crate) facts: Outbox<'e, Fact>,
-}
-
-/// The key of the brick that holds a point.
-pub(crate) fn owner(domain: &Domain, point: Point) -> u64 {
-    let brick = domain.brick_units() as u32;
-    BrickKey::new(point.map(|c| c / brick)).0
 }
 
 /// Bins of at most this many triangles are examined by hashing, larger ones by sorting.

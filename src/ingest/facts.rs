@@ -14,11 +14,9 @@
 //! So a soup that is closed mod 2 as given stays so, but for panels that end in the open and whose
 //! sides are exact copies: nothing tells such a panel from a flat bag.
 
-use std::sync::{Mutex, PoisonError};
-
 use bytemuck::{Pod, Zeroable};
 
-use crate::store::{Record, Sorter, StoreError};
+use crate::store::Record;
 
 /// A triangle that has copies: group, brick, source.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -78,37 +76,6 @@ pub(crate) fn counts_once(kinds: u32) -> bool {
         return !saw(DIFFERS);
     }
     !saw(RIM_EVEN)
-}
-
-/// Records on their way into a sort that all workers fill; the order does not matter there.
-pub(crate) struct Outbox<'s, R: Record> {
-    sorter: &'s Mutex<Sorter<R>>,
-    records: Vec<R>,
-}
-
-/// Records that a worker gathers before it locks the sort.
-const OUTBOX_RECORDS: usize = 1024;
-
-impl<'s, R: Record> Outbox<'s, R> {
-    pub(crate) fn new(sorter: &'s Mutex<Sorter<R>>) -> Self {
-        Self { sorter, records: Vec::new() }
-    }
-
-    pub(crate) fn push(&mut self, record: R) -> Result<(), StoreError> {
-        self.records.push(record);
-        if self.records.len() >= OUTBOX_RECORDS { self.send() } else { Ok(()) }
-    }
-
-    /// Hands over what was gathered. Whoever drops an outbox has sent it before, or has failed.
-    pub(crate) fn send(&mut self) -> Result<(), StoreError> {
-        if self.records.is_empty() {
-            return Ok(());
-        }
-        let mut sorter = self.sorter.lock().unwrap_or_else(PoisonError::into_inner);
-        sorter.extend(&self.records)?;
-        self.records.clear();
-        Ok(())
-    }
 }
 
 #[cfg(test)]

@@ -20,23 +20,19 @@ mod error;
 mod examine;
 mod facts;
 mod fins;
-mod kept;
 mod packed;
 mod rims;
 #[cfg(test)]
 mod settle_tests;
 mod soup;
 mod sums;
-mod touch;
 
 pub use area::SoupMeasure;
-pub use bins::{BIN_ENTRIES, BINS, BinEntry, Bins, fill_bins};
+pub use bins::{BIN_ENTRIES, BINS, Bins, fill_bins};
 pub use crowds::LeftOut;
 pub use duplicates::{DROPS, SettleStats, Settled, settle};
 pub use error::IngestError;
 pub use fins::{FinStats, SheetRule, drop_fins};
-pub use kept::{KeptBin, KeptBins};
 pub use rims::Rims;
 pub use soup::{ATTRIBUTES, AttributeRecord, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use sums::{SoupSums, sum_up};
-pub use touch::for_each_touched_brick;

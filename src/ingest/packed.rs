@@ -1,28 +1,12 @@
-//! Snapped points, edges and triangles packed into words, for sorting and hashing.
+//! Edges and triangles packed into words, for sorting and hashing.
 
 use std::collections::HashSet;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::octree::{Domain, LATTICE_BITS, SoupTriangle};
+use crate::octree::points::{Point, pack_point};
 use crate::store::Record;
-
-pub(crate) type Point = [u32; 3];
-
-/// The corners of a triangle on the lattice.
-pub(crate) fn snapped(domain: &Domain, triangle: &SoupTriangle) -> [Point; 3] {
-    triangle.corners.map(|c| domain.snap(c).map(|q| q as u32))
-}
-
-/// Whether the corners lie on one line.
-pub(crate) fn is_degenerate(corners: [Point; 3]) -> bool {
-    let [p, q, r] = corners.map(|c| c.map(i64::from));
-    (0..3).all(|a| {
-        let (u, v) = ((a + 1) % 3, (a + 2) % 3);
-        (q[u] - p[u]) * (r[v] - p[v]) == (q[v] - p[v]) * (r[u] - p[u])
-    })
-}
 
 /// A triangle by its sorted corners on the lattice.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -124,25 +108,6 @@ pub(crate) fn pack_corners([p, q, r]: [Point; 3]) -> [u64; 4] {
     ]
 }
 
-/// Two ends of 84 bits in three words of 56.
-pub(crate) fn pack_ends([p, q]: [Point; 2]) -> [u64; 3] {
-    let [p, q] = [p, q].map(pack_point);
-    let mask = (1 << 56) - 1;
-    [(p >> 28) as u64, ((p << 28 | q >> 56) & mask) as u64, (q & mask) as u64]
-}
-
-pub(crate) fn pack_point(point: Point) -> u128 {
-    point.iter().fold(0, |bits, &c| bits << LATTICE_BITS | u128::from(c))
-}
-
-pub(crate) fn unpack_ends([high, middle, low]: [u64; 3]) -> [Point; 2] {
-    let mask = (1_u128 << LATTICE_BITS) - 1;
-    let unpack = |bits: u128| [2, 1, 0].map(|i| (bits >> (i * LATTICE_BITS) & mask) as u32);
-    let first = u128::from(high) << 28 | u128::from(middle) >> 28;
-    let second = u128::from(middle & ((1 << 28) - 1)) << 56 | u128::from(low);
-    [unpack(first), unpack(second)]
-}
-
 /// Mixes the words of a packed key (Fibonacci hashing, Knuth 6.4).
 #[derive(Clone, Copy, Default)]
 pub(crate) struct KeyHasher(u64);
@@ -172,6 +137,8 @@ pub(crate) type KeySet<K> = HashSet<K, BuildHasherDefault<KeyHasher>>;
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::octree::LATTICE_BITS;
+    use crate::octree::points::{pack_ends, unpack_ends};
     use proptest::prelude::*;
 
     fn point() -> impl Strategy<Value = Point> {

@@ -128,9 +128,9 @@ impl Adder {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::ingest::touch::for_each_touched_brick;
     use crate::mesh::shapes::{Random, cuboid};
     use crate::octree::Domain;
+    use crate::octree::for_each_touched_brick;
 
     fn sums(triangles: &[[[f64; 3]; 3]]) -> SoupSums {
         let mut adder = Adder::new();

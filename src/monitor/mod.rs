@@ -17,6 +17,8 @@ use serde::{Deserialize, Serialize};
 pub enum Stage {
     /// File to snapped triangles in brick bins.
     Ingest,
+    /// Rims of open sheets to walls and fills.
+    Bridge,
     /// Bins to bricks of crossings.
     Scan,
     /// Odd faces to flipped edges.
@@ -31,14 +33,22 @@ pub enum Stage {
 
 impl Stage {
     /// All stages in running order.
-    pub const ALL: [Self; 6] =
-        [Self::Ingest, Self::Scan, Self::Patch, Self::Sign, Self::Contour, Self::Verify];
+    pub const ALL: [Self; 7] = [
+        Self::Ingest,
+        Self::Bridge,
+        Self::Scan,
+        Self::Patch,
+        Self::Sign,
+        Self::Contour,
+        Self::Verify,
+    ];
 
     /// The name used in the outcome and in the work folder.
     #[must_use]
     pub const fn name(self) -> &'static str {
         match self {
             Self::Ingest => "ingest",
+            Self::Bridge => "bridge",
             Self::Scan => "scan",
             Self::Patch => "patch",
             Self::Sign => "sign",

@@ -48,6 +48,12 @@ impl SnapBox {
         self.hi = std::array::from_fn(|a| self.hi[a].max(point[a]));
     }
 
+    /// The box with so much more on every side.
+    #[must_use]
+    pub fn grown(&self, by: f64) -> Self {
+        Self { lo: self.lo.map(|c| c - by), hi: self.hi.map(|c| c + by) }
+    }
+
     /// Half of the longest side; halves cannot overflow.
     fn half_longest(&self) -> f64 {
         (0..3).map(|a| self.hi[a] * 0.5 - self.lo[a] * 0.5).fold(0.0, f64::max)

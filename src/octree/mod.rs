@@ -2,6 +2,7 @@
 //!
 //! Nothing here knows where bytes lie; nothing here knows a file format or a stage.
 
+mod binned;
 mod brick;
 mod cell_brick;
 mod domain;
@@ -10,10 +11,15 @@ mod edge_brick;
 mod flips;
 mod index;
 mod key;
+mod lost;
 mod plane;
+pub(crate) mod points;
 mod region;
+mod soup_edges;
+mod touch;
 mod triangle;
 
+pub use binned::{BinEntry, BinSpools, BinWalk, BinnedSoup, SoupBin, write_bins};
 pub use brick::{
     ArchiveSize, ArchivedHitBrick, ArchivedSignBrick, BrickError, Crossing, HitBrick, HitEdge,
     MAX_HITS, NO_PLANE, PATCH, RecordBytes, SignBrick, SourcePlane, decode_hits, decode_signs,
@@ -31,6 +37,9 @@ pub use edge_brick::{ArchivedEdgeBrick, EdgeBrick, decode_edges};
 pub use flips::{FLIPS, Flip, FlipReader, FlipRecord, Flips};
 pub use index::{BrickIndex, Neighbour};
 pub use key::BrickKey;
+pub use lost::LostHits;
 pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
+pub use soup_edges::{BorderUse, MOST_USES, SoupEdges, TrianglePair, each_border};
+pub use touch::for_each_touched_brick;
 pub use triangle::{BinTriangle, DropRecord, SoupTriangle, TRANSPARENT};

@@ -5,9 +5,25 @@ use std::path::Path;
 use crate::io::{CoordinateType, Format};
 use crate::octree::{Domain, SnapBox};
 use crate::repair::RepairError;
+use crate::repair::length::Reach;
 use crate::repair::settings::Depth;
 
-/// The domain around `bounds` at the depth that `depth` means for it and for the output's format.
+/// Walls up to this thickness have room beside every model.
+const FREE_CELLS: f64 = 2.0;
+
+/// The box with room for walls that are thicker than those of the default.
+fn roomy(bounds: &SnapBox, sheet_thickness: Reach) -> SnapBox {
+    let half = match sheet_thickness {
+        Reach::Cells(cells) if cells <= FREE_CELLS => return *bounds,
+        // Cells are no wider than the longest side over as many as fit in depth 4.
+        Reach::Cells(cells) => (cells - FREE_CELLS) * 0.5 * bounds.longest() / 8.0,
+        Reach::Length(length) => 0.5 * length.in_model_units(bounds).unwrap_or(0.0),
+    };
+    bounds.grown(half)
+}
+
+/// The domain around `bounds`, with room for walls, at the depth that `depth` means for it and for
+/// the output's format.
 ///
 /// # Errors
 /// [`RepairError::NoUnit`] for metres, since `input` states no unit; or
@@ -16,8 +32,10 @@ pub fn choose_domain(
     input: &Path,
     bounds: &SnapBox,
     depth: Depth,
+    sheet_thickness: Reach,
     format: Format,
 ) -> Result<Domain, RepairError> {
+    let (model, bounds) = (bounds, &roomy(bounds, sheet_thickness));
     let single = format.coordinates() == CoordinateType::F32;
     let around = |depth| {
         Domain::around(bounds, depth, single)
@@ -27,7 +45,7 @@ pub fn choose_domain(
         Depth::Levels(depth) => around(depth),
         Depth::Tolerance { length, max_depth } => {
             let tolerance = length
-                .in_model_units(bounds)
+                .in_model_units(model)
                 .ok_or_else(|| RepairError::NoUnit { path: input.to_path_buf() })?;
             let mut domain = around(*Depth::RANGE.start())?;
             for depth in *Depth::RANGE.start() + 1..=max_depth {

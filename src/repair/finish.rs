@@ -15,6 +15,8 @@ use crate::verify::Proof;
 
 /// Losing more than this share of the area is worth a look.
 const LOST_AREA_SHARE: f64 = 0.2;
+/// More of the area than this in walls is worth a look.
+const WALLED_AREA_SHARE: f64 = 0.05;
 /// So is filling more than this share of the volume.
 const FILLED_VOLUME_SHARE: f64 = 0.05;
 
@@ -32,7 +34,6 @@ pub fn conclude(
     let cell_volume = domain.cell_size().powi(3);
     let invented = Invented {
         patch_polygons: findings.sign.patch_crossings,
-        sheet_corners: findings.sign.sheet_corners,
         filled_volume: findings.sign.filled_cells as f64 * cell_volume,
         sealed_by_resolution_volume: findings.sign.sealed_by_resolution_cells as f64 * cell_volume,
         largest_openings: findings.patch.largest.clone(),
@@ -76,6 +77,8 @@ pub fn conclude(
             contour: findings.contour,
             caveat: run.settings.method.caveat().map(str::to_owned),
         },
+        mend: findings.mend.clone(),
+        thickened: findings.thickened,
         scan: findings.scan,
         patch: findings.patch.clone(),
         sign: findings.sign,
@@ -146,10 +149,24 @@ fn reasons(
             "{share:.0} % of the grid edges that triangles cross belong to walls thinner than a cell"
         ));
     }
-    if invented.sheet_corners > 0 {
+    let walled = findings.mend.walled_area / findings.measure.area.max(f64::MIN_POSITIVE);
+    if walled > WALLED_AREA_SHARE {
         reasons.push(format!(
-            "Open sheets became plates of about a cell: {} corners of the grid lie behind them",
-            invented.sheet_corners
+            "{:.0} % of the area belongs to open sheets, which became walls",
+            walled * 100.0
+        ));
+    }
+    let thickened = findings.thickened.area / findings.measure.area.max(f64::MIN_POSITIVE);
+    if thickened > WALLED_AREA_SHARE {
+        reasons.push(format!(
+            "{:.0} % of the area belongs to walls thinner than a cell, which became thicker",
+            thickened * 100.0
+        ));
+    }
+    if findings.mend.crowded_rims > 0 {
+        reasons.push(format!(
+            "{} edges are open in places with too many of them to tell holes; the patch closed them",
+            findings.mend.crowded_rims
         ));
     }
     if invented.filled_volume > FILLED_VOLUME_SHARE * proof.volume {

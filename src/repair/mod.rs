@@ -34,4 +34,4 @@ pub use outcome::{
 };
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, Limits, Settings};
+pub use settings::{Depth, Limits, MaxHole, Settings, ThinRule};

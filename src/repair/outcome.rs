@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize, Serializer};
 
+use crate::bridge::{MendStats, ThickenStats};
 use crate::contour::ContourStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
 use crate::monitor::{Counter, Gauge, Stage};
@@ -69,8 +70,6 @@ pub struct Found {
 pub struct Invented {
     /// Polygons of the output that lie on patches.
     pub patch_polygons: u64,
-    /// Corners of the grid made inside behind open sheets, which became plates of about a cell.
-    pub sheet_corners: u64,
     /// Volume inside by the fill rule and outside by parity, cubic model units.
     pub filled_volume: f64,
     /// Part of that volume that only the resolution seals.
@@ -179,6 +178,10 @@ pub struct Outcome {
     pub dropped: Dropped,
     /// The output.
     pub output: OutputReport,
+    /// Counts of mending: walls and fills.
+    pub mend: MendStats,
+    /// Counts of what was thickened.
+    pub thickened: ThickenStats,
     /// Counts of scan, patch and sign.
     pub scan: ScanStats,
     /// See `scan`.

@@ -1,13 +1,14 @@
 //! What the user asked for, and what the run may use.
 
 use std::path::PathBuf;
+use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
 use crate::contour::Method;
 use crate::ingest::SheetRule;
 use crate::repair::RepairError;
-use crate::repair::length::{Length, Reach};
+use crate::repair::length::{Length, LengthError, Reach};
 use crate::sign::FillRule;
 use crate::store::Backing;
 
@@ -36,6 +37,42 @@ impl Depth {
     pub const DEFAULT_MAX: u32 = 10;
 }
 
+/// What becomes of walls thinner than a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum ThinRule {
+    /// They become as thick as sheets do.
+    #[default]
+    Thicken,
+    /// They go where the grid misses them.
+    Drop,
+}
+
+/// Which openings are filled; the others are wanted, and what they open into gets walls.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum MaxHole {
+    /// Those that are small for their shell.
+    #[default]
+    Auto,
+    /// All.
+    All,
+    /// Those that are no wider than this.
+    Size(Reach),
+}
+
+impl FromStr for MaxHole {
+    type Err = LengthError;
+
+    fn from_str(text: &str) -> Result<Self, LengthError> {
+        match text.trim() {
+            "auto" => Ok(Self::Auto),
+            "all" => Ok(Self::All),
+            size => size.parse().map(Self::Size),
+        }
+    }
+}
+
 /// Everything that changes the result.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -45,6 +82,14 @@ pub struct Settings {
     pub fill_rule: FillRule,
     /// What becomes of sheets without thickness.
     pub sheets: SheetRule,
+    /// What becomes of walls thinner than a cell.
+    pub thin: ThinRule,
+    /// Which openings are filled.
+    pub max_hole: MaxHole,
+    /// Rims that are no farther apart than this face each other across a crack.
+    pub max_gap: Reach,
+    /// Thickness of the walls that sheets become.
+    pub sheet_thickness: Reach,
     /// Smaller dihedral angles are noise.
     pub crease_deg: f64,
     /// The contouring method.
@@ -64,6 +109,10 @@ impl Default for Settings {
             depth: Depth::DEFAULT,
             fill_rule: FillRule::Solid,
             sheets: SheetRule::Thicken,
+            thin: ThinRule::Thicken,
+            max_hole: MaxHole::Auto,
+            max_gap: Reach::Cells(2.0),
+            sheet_thickness: Reach::Cells(2.0),
             crease_deg: 12.0,
             method: Method::Mdc,
             decimate: Reach::DEFAULT_DECIMATE,

@@ -2,30 +2,33 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::bridge::{HoleRule, MendOptions, MendStats, Mended, ThickenStats, mend, thicken};
 use crate::contour::{
     CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
     write_surface,
 };
 use crate::ingest::{
-    BinEntry, Bins, KeptBin, KeptBins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure,
-    drop_fins, fill_bins, read_soup, settle,
+    Bins, LeftOut, SettleStats, Settled, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins,
+    read_soup, settle,
 };
 use crate::io::{ReadOptions, check_output};
 use crate::mesh::{SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
-use crate::octree::{BrickKey, Domain, Flips};
+use crate::octree::{Domain, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::choose::{Trials, most_trials};
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
+use crate::repair::length::Reach;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
+use crate::repair::settings::{MaxHole, ThinRule};
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
-use crate::scan::{HAS_ODD_FACES, HITS, ScanItem, ScanStats, scan};
-use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, flood};
-use crate::store::{BrickFile, FileState, Resources, StoreError};
+use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
+use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, find_lost, flood};
+use crate::store::{BrickFile, FileState, NoCheckpoints, Resources, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
 
 /// A level of detail whose file is in its place.
@@ -48,6 +51,8 @@ pub struct Findings {
     /// Bricks that triangles touch.
     pub bins: u64,
     pub settle: SettleStats,
+    pub mend: MendStats,
+    pub thickened: ThickenStats,
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub sign: SignStats,
@@ -120,9 +125,11 @@ impl Run<'_> {
             Step::Read => self.read(findings, resources)?,
             Step::Bin => self.bin(workspace, findings, resources)?,
             Step::Settle => self.settle(workspace, findings, resources)?,
+            Step::Mend => self.mend(workspace, findings, resources)?,
             Step::Scan => scan_bins(workspace, findings, handles, resources)?,
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
             Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
+            Step::Thicken => self.thicken(workspace, findings, handles, resources)?,
             Step::Sign => self.sign(workspace, findings, handles, resources)?,
             Step::Choose => self.choose(workspace, findings, handles, resources)?,
             Step::Place => self.place(workspace, findings, handles, resources)?,
@@ -140,6 +147,7 @@ impl Run<'_> {
             Step::Read => std::fs::metadata(self.input).map_or(0, |file| file.len()),
             Step::Bin => findings.soup().stats.triangles,
             Step::Settle | Step::Scan => findings.bins,
+            Step::Mend | Step::Thicken => 0,
             Step::Patch => findings.scan.open_bricks,
             Step::Flood | Step::Sign => findings.scan.bricks,
             Step::Choose if self.settings.max_triangles.is_some() => {
@@ -169,12 +177,14 @@ impl Run<'_> {
         if soup.spool.is_empty() {
             return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
-        let (depth, bounds) = (self.settings.depth, &soup.facts.bounds);
-        let domain = choose_domain(self.input, bounds, depth, self.format)?;
+        let (settings, bounds) = (&self.settings, &soup.facts.bounds);
+        let thickness = settings.sheet_thickness;
+        let domain = choose_domain(self.input, bounds, settings.depth, thickness, self.format)?;
         if self.levels().iter().any(|level| level.decimate.in_cells(bounds, &domain).is_none()) {
             return Err(RepairError::NoUnit { path: self.input.to_path_buf() });
         }
         findings.domain = Some(domain);
+        self.mend_options(findings)?;
         Ok(soup.files())
     }
 
@@ -209,6 +219,91 @@ impl Run<'_> {
         let settled = drop_fins(&bins, settled, rule, domain, (triangles, area), resources)?;
         findings.settle = settled.stats;
         Ok(vec![settled.drops.state().clone()])
+    }
+
+    fn mend(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        let files = workspace.files();
+        let bins = Bins::open(resources, &files, findings.left_out)?;
+        let settled = Settled::open(resources, &files, findings.settle)?;
+        let soup = bins.without(&settled.drops);
+        let triangles = (findings.soup().stats.triangles, findings.settle.rim_edges > 0);
+        let options = self.mend_options(findings)?;
+        let (mended, stats) = mend(&soup, &options, findings.domain(), triangles, resources)?;
+        findings.mend = stats;
+        Ok(mended.files())
+    }
+
+    /// Thickens what would be lost, and makes hits, flips and flood anew with it.
+    fn thicken(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        handles: &mut Handles,
+        resources: &Resources,
+    ) -> Result<Vec<FileState>, RepairError> {
+        findings.thickened = ThickenStats::default();
+        if self.settings.thin == ThinRule::Drop {
+            return Ok(Vec::new());
+        }
+        let files = workspace.files();
+        let domain = *findings.domain();
+        let lost = {
+            let flips = Flips::open(resources, &files)?;
+            let flooded = Flooded::open(resources, &files)?;
+            let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
+            find_lost(hits, &flips, &flooded, resources).map_err(RepairError::Sign)?
+        };
+        if lost.is_empty() {
+            return Ok(Vec::new());
+        }
+        let bins = Bins::open(resources, &files, findings.left_out)?;
+        let mended = Mended::open(resources, &files)?;
+        let soup = mended.soup(bins.spools());
+        let options = self.mend_options(findings)?;
+        let given = findings.soup().stats.triangles;
+        let numbers = (given, given + findings.mend.added_triangles);
+        let found = thicken(&soup, lost, &options, &domain, numbers, resources)?;
+        let Some((thickened, stats)) = found else { return Ok(Vec::new()) };
+        findings.thickened = stats;
+        // Made anew as a whole: what is noted on the way belongs to the steps of before.
+        let resources = &Resources { checkpoints: &NoCheckpoints, ..*resources };
+        handles.hits = None;
+        let (hits, stats) = scan(&thickened.soup(&soup), &domain, resources)?;
+        findings.scan = stats;
+        let cell_units = f64::from(domain.cell_units);
+        let (flips, stats) =
+            patch(&hits, HAS_ODD_FACES, cell_units, resources).map_err(RepairError::Patch)?;
+        findings.patch = stats;
+        let flooded = flood(&hits, &flips, &domain, resources).map_err(RepairError::Sign)?;
+        let mut files = hand_on(hits, &mut handles.hits);
+        files.push(flips.state().clone());
+        files.extend(flooded.files());
+        Ok(files)
+    }
+
+    fn mend_options(&self, findings: &Findings) -> Result<MendOptions, RepairError> {
+        let (bounds, domain) = (&findings.soup().bounds, findings.domain());
+        let in_model_units = |length: Reach| {
+            let cells = length.in_cells(bounds, domain);
+            let no_unit = || RepairError::NoUnit { path: self.input.to_path_buf() };
+            cells.map(|cells| cells * domain.cell_size()).ok_or_else(no_unit)
+        };
+        let settings = &self.settings;
+        Ok(MendOptions {
+            holes: match settings.max_hole {
+                MaxHole::Auto => HoleRule::Auto,
+                MaxHole::All => HoleRule::All,
+                MaxHole::Size(size) => HoleRule::UpTo(in_model_units(size)?),
+            },
+            max_gap: in_model_units(settings.max_gap)?,
+            thickness: in_model_units(settings.sheet_thickness)?,
+            bounds: *bounds,
+        })
     }
 
     fn sign(
@@ -395,17 +490,9 @@ fn scan_bins(
 ) -> Result<Vec<FileState>, RepairError> {
     let files = workspace.files();
     let bins = Bins::open(resources, &files, findings.left_out)?;
-    let settled = Settled::open(resources, &files, findings.settle)?;
-    let mut kept = KeptBins::new(&bins, &settled);
-    let mut next = || {
-        let item = |KeptBin { entry: BinEntry { brick, first, count }, drops }| {
-            let brick = BrickKey(brick);
-            ScanItem { brick, first, count, drops }
-        };
-        Ok(kept.next_bin()?.map(item))
-    };
-    let (triangles, drops) = (&bins.triangles, &settled.drops);
-    let (hits, stats) = scan(triangles, drops, &mut next, findings.domain(), resources)?;
+    let mended = Mended::open(resources, &files)?;
+    let soup = mended.soup(bins.spools());
+    let (hits, stats) = scan(&soup, findings.domain(), resources)?;
     findings.scan = stats;
     Ok(hand_on(hits, &mut handles.hits))
 }

@@ -3,6 +3,7 @@
 use serde::Deserialize;
 use serde::de::IgnoredAny;
 
+use crate::bridge;
 use crate::contour::LOOKS;
 use crate::io::FACES;
 use crate::mesh::SinkFile;
@@ -12,8 +13,18 @@ use crate::store::Manifest;
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 7] =
-    ["facts.spool", "borders.spool", "faces.spool", "even.spool", FACES, LOOKS[0], LOOKS[1]];
+pub const PASSING: [&str; 10] = [
+    "facts.spool",
+    bridge::PASSING[0],
+    bridge::PASSING[1],
+    bridge::THICKENED[0],
+    bridge::THICKENED[1],
+    "faces.spool",
+    "even.spool",
+    FACES,
+    LOOKS[0],
+    LOOKS[1],
+];
 /// The manifest on its way to its name.
 pub const MANIFEST_NEW: &str = "manifest.new";
 

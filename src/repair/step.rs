@@ -3,12 +3,13 @@
 //! A step is what a checkpoint can say of: it is finished, and its files are there. A stage that
 //! takes long is made of several.
 
+use crate::bridge::{ADDED, ADDED_ENTRIES, LEFT_OUT};
 use crate::contour::{CELLS, SURFACE};
 use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, SOUP};
 use crate::monitor::Stage;
 use crate::octree::FLIPS;
 use crate::scan::HITS;
-use crate::sign::{FLOODED, REGIONS, SHEETS, SIGNS};
+use crate::sign::{FLOODED, REGIONS, SIGNS};
 
 /// The output while it is written.
 pub const OUTPUT_PART: &str = "output.part";
@@ -22,12 +23,16 @@ pub enum Step {
     Bin,
     /// Copies are settled, rims counted.
     Settle,
+    /// Open sheets become walls, holes are filled.
+    Mend,
     /// Bins become bricks of hits.
     Scan,
     /// Odd faces become flips.
     Patch,
     /// What the outside reaches.
     Flood,
+    /// What the grid would lose is thickened, and scanned, patched and flooded again.
+    Thicken,
     /// Hits and flips become signs.
     Sign,
     /// The threshold is found that gives few enough triangles, where a number is set.
@@ -44,13 +49,15 @@ pub enum Step {
 
 impl Step {
     /// All steps.
-    pub const ALL: [Self; 12] = [
+    pub const ALL: [Self; 14] = [
         Self::Read,
         Self::Bin,
         Self::Settle,
+        Self::Mend,
         Self::Scan,
         Self::Patch,
         Self::Flood,
+        Self::Thicken,
         Self::Sign,
         Self::Choose,
         Self::Place,
@@ -65,9 +72,11 @@ impl Step {
             Self::Read => "read",
             Self::Bin => "bin",
             Self::Settle => "settle",
+            Self::Mend => "mend",
             Self::Scan => "scan",
             Self::Patch => "patch",
             Self::Flood => "flood",
+            Self::Thicken => "thicken",
             Self::Sign => "sign",
             Self::Choose => "choose",
             Self::Place => "place",
@@ -81,6 +90,7 @@ impl Step {
     pub const fn stage(self) -> Stage {
         match self {
             Self::Read | Self::Bin | Self::Settle => Stage::Ingest,
+            Self::Mend | Self::Thicken => Stage::Bridge,
             Self::Scan => Stage::Scan,
             Self::Patch => Stage::Patch,
             Self::Flood | Self::Sign => Stage::Sign,
@@ -95,14 +105,16 @@ impl Step {
             Self::Read => &[SOUP, ATTRIBUTES],
             Self::Bin => &[BINS, BIN_ENTRIES],
             Self::Settle => &[DROPS],
+            Self::Mend => &[LEFT_OUT, ADDED, ADDED_ENTRIES],
             Self::Scan => &[HITS],
             Self::Patch => &[FLIPS],
-            Self::Flood => &[FLOODED, REGIONS, SHEETS],
+            Self::Flood => &[FLOODED, REGIONS],
             Self::Sign => &[SIGNS],
             Self::Place => &[CELLS],
             Self::Separate => &[SURFACE],
             Self::Write => &[OUTPUT_PART],
-            Self::Choose | Self::Prove => &[],
+            // It makes files of before anew.
+            Self::Thicken | Self::Choose | Self::Prove => &[],
         }
     }
 
@@ -112,10 +124,14 @@ impl Step {
             Self::Read => &[],
             Self::Bin => &[SOUP],
             Self::Settle => &[BINS, BIN_ENTRIES],
-            Self::Scan => &[BINS, BIN_ENTRIES, DROPS],
+            Self::Mend => &[BINS, BIN_ENTRIES, DROPS],
+            Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
             Self::Patch => &[HITS],
             Self::Flood => &[HITS, FLIPS],
-            Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, SHEETS],
+            Self::Thicken => {
+                &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES, HITS, FLIPS, FLOODED, REGIONS]
+            }
+            Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS],
             Self::Choose | Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],
             Self::Write => &[CELLS, SURFACE],
@@ -170,7 +186,8 @@ mod tests {
     #[test]
     fn inputs_of_a_step_outlive_it_by_one() {
         assert!(Step::Scan.still_needs(BINS));
-        assert!(!Step::Patch.still_needs(BINS));
+        assert!(Step::Patch.still_needs(BINS), "what is thickened is scanned again");
+        assert!(!Step::Sign.still_needs(BINS));
         assert!(Step::Sign.still_needs(HITS));
         assert!(Step::Choose.still_needs(HITS));
         assert!(!Step::Place.still_needs(HITS));

@@ -212,6 +212,8 @@ impl Workspace {
     ) -> Result<(), StoreError> {
         let mut manifest = self.manifest();
         manifest.steps.push(step.name().to_owned());
+        // A step may make a file of an earlier one anew.
+        manifest.files.retain(|known| files.iter().all(|file| file.name != known.name));
         manifest.files.extend(files);
         let (kept, spent) =
             std::mem::take(&mut manifest.files).into_iter().partition::<Vec<_>, _>(|file| {

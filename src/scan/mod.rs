@@ -1,6 +1,6 @@
 //! Scan conversion: bins become bricks of crossings.
 //!
-//! In:         `Bins` of ingest and the drops of settled duplicates.
+//! In:         the bins of the soup, without what was dropped and with what was added.
 //! Out:        a brick file of [`HitBrick`]s, one per brick with at least one hit; flag
 //!             [`HAS_ODD_FACES`] where the surface is open.
 //! Invariant:  every hit is decided exactly on the snapped corners, under one symbolic translation
@@ -17,19 +17,15 @@ mod convert;
 #[cfg(test)]
 mod oracle_tests;
 
-use std::ops::Range;
-
 use serde::{Deserialize, Serialize};
 
 use crate::monitor::{Counter, Gauge, Resident};
 use crate::octree::{
-    AXIS_EDGES, BrickKey, Domain, DropRecord, EdgeBits, HitBrick, SIDE, SoupTriangle, encode,
+    AXIS_EDGES, BinnedSoup, BrickKey, Domain, EdgeBits, HitBrick, SIDE, SoupBin, encode,
 };
 use crate::scan::collect::Collector;
 use crate::scan::convert::Converter;
-use crate::store::{
-    BrickFile, BrickPass, Resources, Spool, SpoolPeek, StoreError, ordered_by_weight,
-};
+use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
 pub use collect::CHUNK_HITS;
 
@@ -42,19 +38,6 @@ pub const HAS_ODD_FACES: u32 = 1;
 const TRIANGLE_BYTES: u64 = 80;
 /// More triangles than this leave no more in a brick: three to an edge.
 const MOST_HEAVY_TRIANGLES: u64 = 3 * 3 * AXIS_EDGES as u64;
-
-/// Which triangles a brick is scanned from.
-#[derive(Clone, Debug)]
-pub struct ScanItem {
-    /// The brick.
-    pub brick: BrickKey,
-    /// First triangle in the spool of bins.
-    pub first: u64,
-    /// How many triangles.
-    pub count: u64,
-    /// Numbers of the drops that say which of them to leave out, by source number.
-    pub drops: Range<u64>,
-}
 
 /// Counts of scan conversion.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -100,27 +83,26 @@ struct Scanned {
 /// # Errors
 /// The scratch disk fails, or the caller cancels.
 pub fn scan(
-    triangles: &Spool<SoupTriangle>,
-    drops: &Spool<DropRecord>,
-    mut items: impl FnMut() -> Result<Option<ScanItem>, StoreError>,
+    soup: &BinnedSoup,
     domain: &Domain,
     resources: &Resources,
 ) -> Result<(BrickFile, ScanStats), StoreError> {
     let mut pass = BrickPass::<ScanStats>::start(HITS, resources)?;
+    let mut walk = soup.walk();
     for _ in 0..pass.items() {
-        items()?;
+        walk.next_bin()?;
     }
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
     let bricks = Resident::new(Gauge::ResidentBricks, resources.monitor);
-    let weigh = |item: &ScanItem| item.count.min(MOST_HEAVY_TRIANGLES) * TRIANGLE_BYTES;
+    let weigh = |bin: &SoupBin| bin.count().min(MOST_HEAVY_TRIANGLES) * TRIANGLE_BYTES;
     let scanned = ordered_by_weight(
         resources.pool,
         resources.scales(weigh),
-        || if resources.monitor.cancelled() { Err(StoreError::Cancelled) } else { items() },
+        || if resources.monitor.cancelled() { Err(StoreError::Cancelled) } else { walk.next_bin() },
         || Workspace::new(domain),
-        |space, item| {
+        |space, bin| {
             let _brick = bricks.hold(1);
-            space.scan_brick(triangles, drops, &item, &resident)
+            space.scan_brick(soup, &bin, &resident)
         },
         |scanned| {
             resources.monitor.count(Counter::TrianglesScanned, scanned.stats.triangles);
@@ -151,37 +133,26 @@ impl Workspace {
 
     fn scan_brick(
         &mut self,
-        triangles: &Spool<SoupTriangle>,
-        drops: &Spool<DropRecord>,
-        item: &ScanItem,
+        soup: &BinnedSoup,
+        bin: &SoupBin,
         resident: &Resident,
     ) -> Result<Scanned, StoreError> {
-        self.converter.enter(item.brick);
+        self.converter.enter(bin.brick);
         self.collector.clear();
         let mut stats = ScanStats::default();
-        let drop_count = item.drops.end - item.drops.start;
-        let mut drops = SpoolPeek::range(drops, item.drops.start, drop_count);
-        let mut reader = triangles.reader(item.first, item.count);
-        while let Some(block) = reader.next_block()? {
-            let _block = resident.hold(block.len());
-            for triangle in block {
-                // Both lists ascend by source number.
-                if drops.peek()?.is_some_and(|drop| drop.source == triangle.source) {
-                    drops.next()?;
-                    continue;
-                }
-                stats.triangles += 1;
-                self.converter.convert(triangle, &mut self.collector);
-            }
-        }
+        bin.each_held(soup, Some(resident), |triangle| {
+            stats.triangles += 1;
+            self.converter.convert(triangle, &mut self.collector);
+            Ok(())
+        })?;
         let brick = self.collector.finish();
         if brick.edges.is_empty() {
             let bytes = rkyv::util::AlignedVec::new();
-            return Ok(Scanned { brick: item.brick, bytes, flags: 0, stats });
+            return Ok(Scanned { brick: bin.brick, bytes, flags: 0, stats });
         }
         let open = self.measure(&brick, &mut stats);
         let flags = if open { HAS_ODD_FACES } else { 0 };
-        Ok(Scanned { brick: item.brick, bytes: encode(&brick), flags, stats })
+        Ok(Scanned { brick: bin.brick, bytes: encode(&brick), flags, stats })
     }
 
     /// Counts what the brick owns; whether it sees an odd face.

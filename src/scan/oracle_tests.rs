@@ -14,7 +14,7 @@ use crate::monitor::Void;
 use crate::octree::{
     BrickKey, Domain, EdgeBits, HitEdge, SIDE, SnapBox, decode_hits, edge_position,
 };
-use crate::scan::{HAS_ODD_FACES, ScanItem, scan};
+use crate::scan::{HAS_ODD_FACES, scan};
 use crate::store::{Backing, BrickFile, NoCheckpoints, Resources, Scratch};
 
 /// Normal and min corner of a face, in cells of the grid.
@@ -40,17 +40,8 @@ fn scanned<T>(soup: &[Corners], depth: u32, look: impl FnOnce(&BrickFile, &Domai
     let (bins, _) = fill_bins(&read, &domain, &resources).expect("room on the disk");
     let settled = settle(&bins, &domain, read.facts.stats.triangles, &resources).expect("room");
     assert_eq!(settled.stats.duplicate_triangles, 0, "duplicates are another test's business");
-    let mut entries = Vec::new();
-    bins.entries.read(0, usize::MAX >> 8, &mut entries).expect("readable");
-    let mut items = entries.iter().map(|entry| ScanItem {
-        brick: BrickKey(entry.brick),
-        first: entry.first,
-        count: entry.count,
-        drops: 0..0,
-    });
-    let (bricks, _) =
-        scan(&bins.triangles, &settled.drops, || Ok(items.next()), &domain, &resources)
-            .expect("room");
+    let soup = bins.without(&settled.drops);
+    let (bricks, _) = scan(&soup, &domain, &resources).expect("room");
     look(&bricks, &domain)
 }
 

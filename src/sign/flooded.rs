@@ -8,7 +8,6 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::sign::SignError;
 use crate::sign::graph::{Exterior, GraphBrick};
-use crate::sign::sheets::Sheets;
 use crate::store::{FileState, Resources, Spool, SpoolPeek, SpoolWriter, StoreError};
 
 /// Spool of the bricks.
@@ -37,8 +36,6 @@ pub const SEALED_BY_RESOLUTION: u8 = 2;
 pub struct Flooded {
     bricks: Spool<FloodedBrick>,
     regions: Spool<u8>,
-    /// Corners behind open sheets.
-    pub sheets: Sheets,
 }
 
 impl Flooded {
@@ -47,7 +44,6 @@ impl Flooded {
         bricks: &[GraphBrick],
         parities: &[bool],
         mut exterior: Exterior,
-        sheets: Sheets,
         resources: &Resources,
     ) -> Result<Self, SignError> {
         let mut records = SpoolWriter::create(resources.scratch, FLOODED)?;
@@ -65,7 +61,7 @@ impl Flooded {
                 regions.push(bits | if sealed { SEALED_BY_RESOLUTION } else { 0 })?;
             }
         }
-        Ok(Self { bricks: records.finish()?, regions: regions.finish()?, sheets })
+        Ok(Self { bricks: records.finish()?, regions: regions.finish()? })
     }
 
     /// Opens what an earlier run wrote.
@@ -76,14 +72,13 @@ impl Flooded {
         Ok(Self {
             bricks: Spool::open(resources.scratch, FileState::find(files, FLOODED)?)?,
             regions: Spool::open(resources.scratch, FileState::find(files, REGIONS)?)?,
-            sheets: Sheets::open(resources, files)?,
         })
     }
 
     /// The files, as they have to be found again.
     #[must_use]
     pub fn files(&self) -> Vec<FileState> {
-        vec![self.bricks.state().clone(), self.regions.state().clone(), self.sheets.state().clone()]
+        vec![self.bricks.state().clone(), self.regions.state().clone()]
     }
 
     /// The number of regions.

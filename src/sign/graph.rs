@@ -11,7 +11,6 @@ use crate::octree::{
 };
 use crate::sign::SignError;
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
-use crate::sign::sheets::Sheets;
 use crate::store::{
     BrickFile, Labels, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite,
     ordered_by_weight,
@@ -28,8 +27,6 @@ pub struct GraphBrick {
     pub regions: u16,
     /// Whether an odd number of marks lies on the x line through its min corner.
     pub odd_first_line: bool,
-    /// Whether a patch flipped back an odd edge of it.
-    pub has_sheet: bool,
 }
 
 /// A piece of a face between two bricks, as one of them sees it.
@@ -90,19 +87,17 @@ struct BrickSays {
     brick: BrickKey,
     regions: u16,
     odd_first_line: bool,
-    has_sheet: bool,
     sides: [FaceRegions; 6],
     even: Vec<[u16; 2]>,
 }
 
-/// Finds the regions of all bricks; corners behind `sheets` are regions of their own.
+/// Finds the regions of all bricks.
 pub fn build_graph(
     hits: &BrickFile,
     flips: &Flips,
-    sheets: Option<&Sheets>,
     resources: &Resources,
 ) -> Result<RegionGraph, SignError> {
-    let mut items = LoadItems::new(hits, flips, sheets, resources);
+    let mut items = LoadItems::new(hits, flips, resources);
     let mut bricks = Vec::with_capacity(hits.len());
     let mut pieces = Sorter::<FacePiece>::new(resources.scratch, resources.share_bytes / 4);
     let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, "even.spool")?;
@@ -131,7 +126,6 @@ pub fn build_graph(
                 first_region: base,
                 regions: says.regions,
                 odd_first_line: says.odd_first_line,
-                has_sheet: says.has_sheet,
             });
             regions += u64::from(says.regions);
             resources.monitor.advance(1);
@@ -150,7 +144,6 @@ fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
         brick,
         regions: regions.count,
         odd_first_line: loaded.marks.rows(0)[0].count_ones() % 2 == 1,
-        has_sheet: !loaded.sheet_edges.is_empty(),
         sides,
         even: even_pairs(loaded, &regions),
     }

@@ -15,20 +15,20 @@ mod graph;
 mod load;
 mod parity;
 mod relabel;
-mod sheets;
+mod thin;
+mod tips;
 
 use serde::{Deserialize, Serialize};
 
 use crate::monitor::Monitor;
 use crate::octree::{BrickError, BrickIndex, Domain, Flips};
-use crate::sign::graph::{Exterior, GraphBrick, build_graph};
+use crate::sign::graph::build_graph;
 use crate::sign::parity::base_parities;
 use crate::sign::relabel::relabel;
-use crate::sign::sheets::{Sheets, find_sheets};
 use crate::store::{BrickFile, Resources, StoreError};
 
 pub use flooded::{FLOODED, Flooded, FloodedBrick, REGIONS};
-pub use sheets::{SHEETS, SheetCorner};
+pub use thin::find_lost;
 
 /// Name of the brick file that sign generation leaves.
 pub const SIGNS: &str = "signs.bricks";
@@ -85,8 +85,8 @@ pub struct SignStats {
     pub sealed_by_resolution_cells: u64,
     /// Edges with hits whose both ends are outside: features thinner than a cell.
     pub thin_edges: u64,
-    /// Corners made inside behind open sheets, which became plates of about a cell.
-    pub sheet_corners: u64,
+    /// Corners taken off since they would have been specks.
+    pub tip_corners: u64,
     /// Edges with hits whose both ends are inside: surface hidden in the solid.
     pub buried_edges: u64,
 }
@@ -101,7 +101,7 @@ impl SignStats {
         self.filled_cells += other.filled_cells;
         self.sealed_by_resolution_cells += other.sealed_by_resolution_cells;
         self.thin_edges += other.thin_edges;
-        self.sheet_corners += other.sheet_corners;
+        self.tip_corners += other.tip_corners;
         self.buried_edges += other.buried_edges;
     }
 }
@@ -114,7 +114,7 @@ impl SignError {
     }
 }
 
-/// Finds what the outside reaches, and the open sheets that become plates.
+/// Finds what the outside reaches.
 ///
 /// # Errors
 /// [`SignError`].
@@ -124,13 +124,12 @@ pub fn flood(
     domain: &Domain,
     resources: &Resources,
 ) -> Result<Flooded, SignError> {
-    let (mut bricks, mut exterior) = reach(hits, flips, None, domain, resources)?;
-    let sheets = find_sheets(hits, flips, &bricks, &mut exterior, resources)?;
-    if !sheets.is_empty() {
-        (bricks, exterior) = reach(hits, flips, Some(&sheets), domain, resources)?;
-    }
-    let parities = base_parities(&bricks);
-    Flooded::write(&bricks, &parities, exterior, sheets, resources)
+    let mut graph = build_graph(hits, flips, resources)?;
+    let keys = graph.bricks.iter().map(|brick| brick.key).collect();
+    let index = BrickIndex::new(keys, domain.bricks_per_side());
+    let exterior = graph.flood(&index, resources)?;
+    let parities = base_parities(&graph.bricks);
+    Flooded::write(&graph.bricks, &parities, exterior, resources)
 }
 
 /// Decides all signs.
@@ -147,21 +146,6 @@ pub fn assign_signs(
     let (file, stats) = relabel(hits, flips, flooded, rule, resources)?;
     note_fill(&stats, resources.monitor);
     Ok((file, stats))
-}
-
-/// Finds all regions and what the outside reaches of them.
-fn reach(
-    hits: &BrickFile,
-    flips: &Flips,
-    sheets: Option<&Sheets>,
-    domain: &Domain,
-    resources: &Resources,
-) -> Result<(Vec<GraphBrick>, Exterior), SignError> {
-    let mut graph = build_graph(hits, flips, sheets, resources)?;
-    let keys = graph.bricks.iter().map(|brick| brick.key).collect();
-    let index = BrickIndex::new(keys, domain.bricks_per_side());
-    let exterior = graph.flood(&index, resources)?;
-    Ok((graph.bricks, exterior))
 }
 
 fn note_fill(stats: &SignStats, monitor: &dyn Monitor) {

@@ -8,6 +8,7 @@ use crate::octree::{
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
+use crate::sign::tips::take_off_tips;
 use crate::sign::{FillRule, SIGNS, SignError, SignStats};
 use crate::store::{BrickFile, BrickPass, Resources, ordered_by_weight};
 
@@ -36,7 +37,7 @@ pub fn relabel(
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
     let mut pass = BrickPass::<SignStats>::start(SIGNS, resources)?;
-    let mut items = LoadItems::new(hits, flips, Some(&flooded.sheets), resources);
+    let mut items = LoadItems::new(hits, flips, resources);
     let mut bricks = flooded.by_brick();
     for _ in 0..pass.items() {
         items.next()?;
@@ -97,10 +98,10 @@ impl Workspace {
         }
         self.parity.from_marks(&self.loaded.marks, item.base_inside);
         self.set_signs(&regions, item, rule)?;
-        let sheet_corners = self.add_sheets(&item.load.sheet_corners);
+        let tip_corners = take_off_tips(&mut self.signs);
         self.marks.set_differences(&self.signs);
         let mut stats = self.count();
-        stats.sheet_corners = sheet_corners;
+        stats.tip_corners = tip_corners;
         let brick = self.pick_crossings(record, &item.load.flips, &mut stats);
         stats.bricks = u64::from(!brick.crossings.is_empty());
         let bytes = encode(&brick);
@@ -129,17 +130,6 @@ impl Workspace {
             self.sealed.rows[row] = sealed;
         }
         Ok(())
-    }
-
-    /// Makes the corners behind sheets inside; how many of them the brick owns.
-    fn add_sheets(&mut self, corners: &[u32]) -> u64 {
-        let mut owned = 0;
-        for &corner in corners {
-            let (row, x) = (corner as usize / LINES, corner as usize % LINES);
-            self.signs.rows[row] |= 1 << x;
-            owned += u64::from(x < SIDE && row % LINES < SIDE && row / LINES < SIDE);
-        }
-        owned
     }
 
     /// Counts corners that the brick owns, and leaf cells.

@@ -12,6 +12,7 @@ mod digest;
 mod error;
 mod manifest;
 mod mapped;
+mod outbox;
 mod pipeline;
 mod resources;
 mod scratch;
@@ -30,6 +31,7 @@ pub(crate) use digest::digest;
 pub use digest::{DIGEST_BYTES, Digest, Digester};
 pub use error::StoreError;
 pub use manifest::{Manifest, load_manifest, save_manifest};
+pub use outbox::Outbox;
 pub use pipeline::{Scales, ordered, ordered_by_weight};
 pub use resources::Resources;
 pub use scratch::{Scratch, sync_folder};
@@ -40,4 +42,4 @@ pub use table::Table;
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.
-pub const FORMAT_VERSION: u32 = 3;
+pub const FORMAT_VERSION: u32 = 4;

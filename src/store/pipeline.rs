@@ -4,6 +4,7 @@
 //! until the oldest is taken.
 
 use std::collections::{BTreeMap, VecDeque};
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 
 use crossbeam::channel::bounded;
 use rayon::ThreadPool;
@@ -61,14 +62,15 @@ pub fn ordered_by_weight<I: Send, O: Send, W, E: Send>(
     let limit = workers * ITEMS_PER_WORKER;
     pool.in_place_scope(|scope| {
         let (item_sender, items) = bounded::<(u64, I)>(limit);
-        let (result_sender, results) = bounded::<(u64, Result<O, E>)>(limit);
+        let (result_sender, results) = bounded::<(u64, std::thread::Result<Result<O, E>>)>(limit);
         for _ in 0..workers {
             let (items, result_sender) = (items.clone(), result_sender.clone());
             let (workspace, work) = (&workspace, &work);
             scope.spawn(move |_| {
                 let mut space = workspace();
                 for (number, item) in items {
-                    if result_sender.send((number, work(&mut space, item))).is_err() {
+                    let worked = catch_unwind(AssertUnwindSafe(|| work(&mut space, item)));
+                    if result_sender.send((number, worked)).is_err() {
                         return;
                     }
                 }
@@ -98,7 +100,8 @@ pub fn ordered_by_weight<I: Send, O: Send, W, E: Send>(
                 return Ok(());
             }
             let (number, result) = results.recv().expect("workers answer until all is taken");
-            waiting.insert(number, result);
+            // A bug in a worker ends the run: nobody else would tell that its result is missing.
+            waiting.insert(number, result.unwrap_or_else(|bug| resume_unwind(bug)));
             while let Some(result) = waiting.remove(&taken) {
                 take(result?)?;
                 taken += 1;
@@ -115,6 +118,18 @@ mod tests {
 
     fn pool(threads: usize) -> ThreadPool {
         rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool")
+    }
+
+    #[test]
+    #[should_panic(expected = "a bug")]
+    fn a_bug_in_a_worker_ends_the_run_on_any_number_of_threads() {
+        let mut next = 0_u64;
+        let feed = || {
+            next += 1;
+            Ok::<_, ()>((next <= 1000).then_some(next))
+        };
+        let work = |(): &mut (), item| if item == 500 { panic!("a bug") } else { Ok(item) };
+        let _ = ordered(&pool(4), feed, || (), work, |_| Ok(()));
     }
 
     #[test]

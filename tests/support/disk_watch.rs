@@ -8,11 +8,12 @@ use brickmend::monitor::{Monitor, Stage};
 
 /// What each stage still needs of the files that a folder holds, and what it writes. A file that
 /// no later step reads may be there or not: it does not count.
-const NEEDED: [(Stage, &[&str]); 6] = [
+const NEEDED: [(Stage, &[&str]); 7] = [
     (Stage::Ingest, &["soup", "attributes", "bins", "drops", "facts"]),
-    (Stage::Scan, &["attributes", "bins", "drops", "hits"]),
-    (Stage::Patch, &["attributes", "bins", "drops", "hits", "faces", "flips"]),
-    (Stage::Sign, &["attributes", "hits", "flips", "even", "sheets", "signs"]),
+    (Stage::Bridge, &["attributes", "bins", "drops", "borders", "rims", "leftout", "added"]),
+    (Stage::Scan, &["attributes", "bins", "leftout", "added", "hits"]),
+    (Stage::Patch, &["attributes", "bins", "leftout", "added", "hits", "faces", "flips"]),
+    (Stage::Sign, &["attributes", "bins", "leftout", "added", "hits", "flips", "even", "signs"]),
     (Stage::Contour, &["attributes", "hits", "flips", "signs", "cells", "output"]),
     (Stage::Verify, &["attributes", "cells", "output"]),
 ];

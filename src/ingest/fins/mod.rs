@@ -15,21 +15,15 @@
 //! Fails:      [`StoreError`].
 //! Source:     ours.
 
-mod edges;
 mod parts;
-
-use std::sync::{Mutex, PoisonError};
 
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::bins::Bins;
 use crate::ingest::duplicates::{DROPS, SettleStats, Settled};
-use crate::ingest::facts::Outbox;
-use crate::ingest::fins::edges::{BorderUse, EdgeFinder, Pair};
 use crate::ingest::fins::parts::Parts;
-use crate::ingest::kept::KeptBins;
-use crate::octree::{Domain, DropRecord};
-use crate::store::{Resources, Sorter, SpoolWriter, StoreError, Unite, ordered};
+use crate::octree::{BinnedSoup, Domain, DropRecord, SoupEdges, TrianglePair};
+use crate::store::{Resources, Sorter, SpoolWriter, StoreError, Unite};
 
 /// What becomes of sheets without thickness.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -57,9 +51,6 @@ pub struct FinStats {
     pub area: f64,
 }
 
-/// Sorts of one bin and of all that are alive at one time.
-const SORTS: u64 = 4;
-
 /// Adds the triangles of fins to the drops of `settled`; of free sheets where `rule` says so.
 /// `triangles` is the number of source numbers, `area` that of the soup.
 ///
@@ -77,10 +68,11 @@ pub fn drop_fins(
         return Ok(settled);
     }
     let share = resources.share_bytes / 4;
-    let (pairs, borders) = find_edges(bins, &settled, domain, resources)?;
+    let soup = bins.without(&settled.drops);
+    let SoupEdges { pairs, borders } = SoupEdges::find(&soup, domain, resources)?;
     let mut sheets = Unite::new(resources.scratch, share, triangles)?;
     let mut sorted = pairs.finish()?;
-    while let Some(Pair { one, other }) = sorted.next()? {
+    while let Some(TrianglePair { one, other, .. }) = sorted.next()? {
         sheets.unite(one, other)?;
     }
     let unit = domain.cell_size() / f64::from(domain.cell_units);
@@ -90,17 +82,17 @@ pub fn drop_fins(
         parts.end()?;
         return Ok(settled);
     }
-    let mut kept = KeptBins::new(bins, &settled);
-    while let Some(bin) = kept.next_bin()? {
-        let brick = bin.entry.brick;
-        bin.each(bins, &settled, |triangle| parts.add_area(triangle, domain, brick))?;
+    let mut walk = soup.walk();
+    while let Some(bin) = walk.next_bin()? {
+        let brick = bin.brick.0;
+        bin.each(&soup, |triangle| parts.add_area(triangle, domain, brick))?;
     }
     let stats = parts.decide(rule, area)?;
     if stats.triangles == 0 {
         parts.end()?;
         return Ok(settled);
     }
-    let drops = all_drops(bins, &settled, &mut parts, resources)?;
+    let drops = all_drops(&soup, &mut parts, resources)?;
     parts.end()?;
     let stats = SettleStats { fins: stats, ..settled.stats };
     drop(settled);
@@ -112,56 +104,23 @@ pub fn drop_fins(
     Ok(Settled { drops: spool.finish()?, stats })
 }
 
-/// The edges of all bins: those that join two triangles, and all others.
-fn find_edges(
-    bins: &Bins,
-    settled: &Settled,
-    domain: &Domain,
-    resources: &Resources,
-) -> Result<(Sorter<Pair>, Sorter<BorderUse>), StoreError> {
-    let scratch = resources.scratch;
-    let workers = resources.pool.current_num_threads() as u64;
-    let share_bytes = resources.share_bytes / 2 / workers / SORTS;
-    let pairs = Mutex::new(Sorter::new(scratch, resources.share_bytes / 8));
-    let borders = Mutex::new(Sorter::new(scratch, resources.share_bytes / 8));
-    let mut kept = KeptBins::new(bins, settled);
-    ordered(
-        resources.pool,
-        || {
-            if resources.monitor.cancelled() {
-                return Err(StoreError::Cancelled);
-            }
-            kept.next_bin()
-        },
-        || {
-            let (pairs, borders) = (Outbox::new(&pairs), Outbox::new(&borders));
-            EdgeFinder { bins, settled, domain, scratch, share_bytes, pairs, borders }
-        },
-        |finder, bin| finder.find(&bin),
-        |()| Ok(()),
-    )?;
-    let pairs = pairs.into_inner().unwrap_or_else(PoisonError::into_inner);
-    Ok((pairs, borders.into_inner().unwrap_or_else(PoisonError::into_inner)))
-}
-
 /// The drops of before, and those of the sheets that go.
 fn all_drops(
-    bins: &Bins,
-    settled: &Settled,
+    soup: &BinnedSoup,
     parts: &mut Parts,
     resources: &Resources,
 ) -> Result<Sorter<DropRecord>, StoreError> {
     let mut drops = Sorter::<DropRecord>::new(resources.scratch, resources.share_bytes / 4);
-    let mut reader = settled.drops.reader(0, settled.drops.len());
+    let mut reader = soup.drops.reader(0, soup.drops.len());
     while let Some(block) = reader.next_block()? {
         drops.extend(block)?;
     }
-    let mut kept = KeptBins::new(bins, settled);
-    while let Some(bin) = kept.next_bin()? {
-        bin.each(bins, settled, |triangle| {
+    let mut walk = soup.walk();
+    while let Some(bin) = walk.next_bin()? {
+        bin.each(soup, |triangle| {
             if parts.goes(triangle.source)? {
-                let brick = bin.entry.brick;
-                drops.push(DropRecord { brick, source: triangle.source, unused: 0 })?;
+                let (brick, source) = (bin.brick.0, triangle.source);
+                drops.push(DropRecord { brick, source, unused: 0 })?;
             }
             Ok(())
         })?;

@@ -5,12 +5,9 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::ingest::edges::length_of;
-use crate::ingest::examine::owner;
-use crate::ingest::fins::edges::BorderUse;
 use crate::ingest::fins::{FinStats, SheetRule};
-use crate::ingest::packed::{snapped, unpack_ends};
-use crate::octree::{Domain, SoupTriangle};
+use crate::octree::points::{length_of, owner, snapped, unpack_ends};
+use crate::octree::{BorderUse, Domain, MOST_USES, SoupTriangle, each_border};
 use crate::store::{Labels, Resources, Scratch, Sorter, Spool, SpoolWriter, StoreError, Table};
 
 /// Share of the squared area that the squared moments of the normals make up in a flat sheet: all
@@ -22,9 +19,6 @@ const MOST_AREA_SHARE: f64 = 0.1;
 
 /// A sheet of more triangles was made on purpose, as the end of a roll of paper is.
 const MOST_TRIANGLES: u32 = 64;
-
-/// Nothing that hangs on an edge of so many triangles is told apart.
-const MOST_USES: usize = 64;
 
 /// Spool of the borders of sheets.
 const BORDERS: &str = "borders.spool";
@@ -108,7 +102,7 @@ impl Parts {
             spool.push(border)?;
         }
         let spool = spool.finish()?;
-        each_edge(&spool, |uses| self.take_edge(uses))?;
+        each_border(&spool, |uses| self.take_edge(uses))?;
         self.borders = Some(spool);
         Ok(())
     }
@@ -134,6 +128,7 @@ impl Parts {
     fn take_edge(&mut self, uses: &[BorderUse]) -> Result<(), StoreError> {
         let length = length_of(unpack_ends(uses[0].ends), self.unit);
         let sheets = self.sheets_of(uses)?;
+        // Nothing that hangs on an edge of so many triangles is told apart.
         let is_crowded = uses.len() == MOST_USES;
         for (i, &number) in sheets.iter().enumerate() {
             let mut sheet = self.sheets.get(number)?;
@@ -226,7 +221,7 @@ impl Parts {
     fn keep_what_would_open(&mut self) -> Result<bool, StoreError> {
         let Some(borders) = self.borders.take() else { return Ok(false) };
         let mut has_kept = false;
-        each_edge(&borders, |uses| {
+        each_border(&borders, |uses| {
             has_kept |= self.keep_on(uses)?;
             Ok(())
         })?;
@@ -261,26 +256,4 @@ impl Parts {
         let Some(number) = self.sheet_of(source)? else { return Ok(false) };
         Ok(self.sheets.get(number)?.state & MAY_GO != 0)
     }
-}
-
-/// Visits the uses of edge after edge; of a crowded one [`MOST_USES`] at a time.
-fn each_edge(
-    borders: &Spool<BorderUse>,
-    mut visit: impl FnMut(&[BorderUse]) -> Result<(), StoreError>,
-) -> Result<(), StoreError> {
-    let mut reader = borders.reader(0, borders.len());
-    let mut around: Vec<BorderUse> = Vec::with_capacity(MOST_USES);
-    while let Some(block) = reader.next_block()? {
-        for border in block {
-            if around.first().is_some_and(|first| first.ends != border.ends) {
-                visit(&around)?;
-                around.clear();
-            } else if around.len() == MOST_USES {
-                visit(&around)?;
-                around.remove(0);
-            }
-            around.push(*border);
-        }
-    }
-    if around.is_empty() { Ok(()) } else { visit(&around) }
 }

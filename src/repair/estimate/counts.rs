@@ -6,7 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ingest::SoupSums;
+use crate::ingest::{Rims, SoupSums};
 use crate::octree::{Domain, SIDE};
 
 /// Room for the place of the grid: a share of the hits, and so many times the root of them.
@@ -29,6 +29,13 @@ const CROSSINGS_PER_AREA: f64 = 1.5;
 /// Triangles come in Morton order: what is written ends along a half, a quarter and an eighth of the
 /// model at a time, together so many sections through it.
 const OPEN_SECTIONS: f64 = 1.5;
+
+/// A wall has two faces in place of one, somewhat larger at creases.
+const WALL_FACES: f64 = 2.2;
+/// Triangles at the end of a wall, and of a fill, for each edge of a rim.
+const TRIANGLES_PER_RIM: f64 = 4.0;
+/// Bricks that such a triangle touches, on top of those that the rim's triangle does.
+const BRICKS_PER_END: f64 = 1.5;
 
 /// The counts of one grid.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -56,6 +63,8 @@ pub struct Bounds {
     pub hits: u64,
     /// As [`Counts::brick_triangles`].
     pub brick_triangles: u64,
+    /// Triangles of walls and fills, once for every brick that they touch.
+    pub added_triangles: u64,
     /// Faces that the open soup leaves odd.
     pub odd_faces: u64,
     /// Edges that patches flip.
@@ -69,9 +78,9 @@ pub struct Bounds {
 }
 
 impl Counts {
-    /// The counts of `sums` in the grid of `domain`.
+    /// The counts of `sums` in the grid of `domain`, where sheets become walls of so many cells.
     #[must_use]
-    pub fn predict(sums: &SoupSums, domain: &Domain) -> Self {
+    pub fn predict(sums: &SoupSums, domain: &Domain, sheet_cells: f64) -> Self {
         let cell = domain.cell_size();
         let brick = cell * SIDE as f64;
         let extent: [f64; 3] =
@@ -85,6 +94,8 @@ impl Counts {
         let bricks = pairs.min(boxed.bricks);
         let most_hits = hits * (1.0 + HIT_SHARE) + HIT_ROOTS * hits.sqrt() + 1.0;
         let most_pairs = (pairs * (1.0 + PAIR_SHARE)).min(most_touched);
+        let added = Added::around(&sums.rims, sheet_cells, cell, (most_hits, most_pairs));
+        let most_hits = most_hits + added.hits;
         let open = Open::around(sums.rims.length / cell, hits, most_hits, &boxed);
         let crossings = (most_hits + open.flips + open.odd_faces).min(3.0 * boxed.cells);
         Self {
@@ -97,6 +108,7 @@ impl Counts {
             at_most: Bounds {
                 hits: most_hits as u64,
                 brick_triangles: most_pairs as u64,
+                added_triangles: added.pairs as u64,
                 odd_faces: open.odd_faces as u64,
                 flips: open.flips as u64,
                 crossings: crossings as u64,
@@ -132,6 +144,23 @@ impl Boxed {
             side_cells: x * y + y * z + z * x,
             longest: x.max(y).max(z).max(1.0),
         }
+    }
+}
+
+/// What walls and fills add at most.
+struct Added {
+    hits: f64,
+    pairs: f64,
+}
+
+impl Added {
+    fn around(rims: &Rims, sheet_cells: f64, cell: f64, (hits, pairs): (f64, f64)) -> Self {
+        if rims.edges == 0.0 {
+            return Self { hits: 0.0, pairs: 0.0 };
+        }
+        let ends = CROSSINGS_PER_AREA * sheet_cells * rims.length / cell;
+        let at_rims = TRIANGLES_PER_RIM * rims.edges * BRICKS_PER_END;
+        Self { hits: WALL_FACES * hits + ends, pairs: WALL_FACES * pairs + at_rims }
     }
 }
 

@@ -59,6 +59,13 @@ const REGION_BYTES_PER_FACE: f64 = 24.0;
 /// A vertex in text, and what a line of a face has besides digits.
 const LINE_BYTES: f64 = 66.0;
 const FACE_LINE_BYTES: f64 = 5.0;
+/// A rim edge with its order and its share; a sample of it and a contact; a triangle of a wall with
+/// its corners and miters.
+const RIM_BYTES: f64 = 140.0;
+const SAMPLE_BYTES: f64 = 68.0;
+const WALL_BYTES: f64 = 400.0;
+/// Bricks near a sample: most are near to one.
+const NEAR_BRICKS: f64 = 1.6;
 /// Hash of a vertex, and its position in the table of the reader.
 const HASH_BYTES: f64 = 8.0;
 const POSITION_BYTES: f64 = 24.0;
@@ -83,6 +90,8 @@ pub struct DiskSteps {
     pub bin: u64,
     /// Duplicates are settled.
     pub settle: u64,
+    /// Sheets become walls, holes are filled.
+    pub mend: u64,
     /// Bins become hits.
     pub scan: u64,
     /// Odd faces become flips.
@@ -107,10 +116,10 @@ impl DiskSteps {
     /// The largest of them.
     #[must_use]
     pub fn peak(&self) -> u64 {
-        let Self { read, bin, settle, scan, patch, flood, relabel, choose, .. } = *self;
-        let Self { place, separate, write, prove, .. } = *self;
-        let before = [read, bin, settle, scan, patch, flood, relabel, choose];
-        let all = before.into_iter().chain([place, separate, write, prove]);
+        let Self { read, bin, settle, mend, scan, patch, flood, .. } = *self;
+        let Self { relabel, choose, place, separate, write, prove, .. } = *self;
+        let before = [read, bin, settle, mend, scan, patch, flood];
+        let all = before.into_iter().chain([relabel, choose, place, separate, write, prove]);
         all.max().unwrap_or(0)
     }
 }
@@ -119,6 +128,8 @@ impl DiskSteps {
 pub struct DiskModel<'e> {
     pub sums: &'e SoupSums,
     pub counts: &'e Counts,
+    /// Side of a cell, model units.
+    pub cell: f64,
     pub plan: &'e MemoryPlan,
     pub format: Format,
     /// What the reader of the input spilled.
@@ -154,6 +165,7 @@ impl DiskModel<'_> {
         let bins = SOUP_BYTES * pairs + BIN_ENTRY_BYTES * self.counts.bricks as f64;
         let runs = spilled(BIN_SORT_BYTES * pairs, ORDER_BYTES / BIN_SORT_BYTES, share);
         let drops = DROP_BYTES * pairs;
+        let added = SOUP_BYTES * most.added_triangles as f64;
         let odd = most.odd_faces as f64;
         // Sorted by place, written once, sorted by component.
         let faces = FACE_BYTES * odd + 2.0 * spilled(FACE_BYTES * odd, 0.0, share / 4.0);
@@ -168,9 +180,10 @@ impl DiskModel<'_> {
                 + bins
                 + drops
                 + self.edge_sorts(pairs).max(self.fins(pairs, drops))) as u64,
-            scan: (kept + bins + drops + hits) as u64,
-            patch: (kept + bins + drops + hits + faces + 2.0 * flips) as u64,
-            flood: (kept + hits + flips + regions) as u64,
+            mend: (kept + bins + 2.0 * drops + added + self.mending(pairs, drops)) as u64,
+            scan: (kept + bins + drops + added + hits) as u64,
+            patch: (kept + bins + drops + added + hits + faces + 2.0 * flips) as u64,
+            flood: (kept + bins + drops + added + hits + flips + regions) as u64,
             relabel: (kept + hits + flips + regions + signs) as u64,
             choose: (kept + hits + flips + signs + cells + 2.0 * surface) as u64,
             place: (kept + hits + flips + signs + cells) as u64,
@@ -260,6 +273,25 @@ impl DiskModel<'_> {
         let labels = spilled(LABEL_BYTES * triangles, 0.0, share / 8.0);
         let sheets = spilled(SHEET_BYTES * triangles.min(borders / BORDER_BYTES), 0.0, share / 8.0);
         sorts + borders + 3.0 * labels + sheets + 2.0 * drops
+    }
+
+    /// What is written while sheets are mended, where the soup is open.
+    fn mending(&self, pairs: f64, drops: f64) -> f64 {
+        let edges = self.fins(pairs, drops);
+        if edges == 0.0 {
+            return 0.0;
+        }
+        let (sums, cell) = (self.sums, self.cell);
+        let triangles = sums.finite_triangles() as f64;
+        let rims = (BORDERS_PER_RIM * sums.rims.edges).min(3.0 * triangles);
+        let samples = NEAR_BRICKS * (rims + BORDERS_PER_RIM * sums.rims.length / cell);
+        let share = self.plan.share_bytes as f64;
+        let added = BIN_SORT_BYTES * self.counts.at_most.added_triangles as f64;
+        edges
+            + RIM_BYTES * rims
+            + spilled(SAMPLE_BYTES * samples, 0.0, share / 4.0)
+            + spilled(WALL_BYTES * triangles, 0.0, share / 8.0)
+            + spilled(added, ORDER_BYTES / BIN_SORT_BYTES, share / 4.0)
     }
 
     /// What the proof and the reader of the written file spill.

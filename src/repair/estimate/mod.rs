@@ -120,10 +120,20 @@ pub fn estimate(
     if sums.finite_triangles() == 0 || sums.area == 0.0 {
         return Err(RepairError::no_triangle(input, &sums.stats));
     }
-    let grid = choose_domain(input, &sums.bounds, settings.depth, format)?;
-    let counts = Counts::predict(&sums, &grid);
+    let thickness = settings.sheet_thickness;
+    let grid = choose_domain(input, &sums.bounds, settings.depth, thickness, format)?;
+    let sheet_cells = settings.sheet_thickness.in_cells(&sums.bounds, &grid);
+    let no_unit = || RepairError::NoUnit { path: input.to_path_buf() };
+    let counts = Counts::predict(&sums, &grid, sheet_cells.ok_or_else(no_unit)?);
     let reader_bytes = scratch.written_bytes();
-    let disk_model = DiskModel { sums: &sums, counts: &counts, plan: &plan, format, reader_bytes };
+    let disk_model = DiskModel {
+        sums: &sums,
+        counts: &counts,
+        cell: grid.cell_size(),
+        plan: &plan,
+        format,
+        reader_bytes,
+    };
     let files = disk_model.files();
     let mut disk = disk_model.steps(&files);
     if settings.max_triangles.is_none() {

@@ -13,6 +13,7 @@ use crate::repair::estimate::counts::Counts;
 const PER_INPUT_BYTE: f64 = 10.0;
 const PER_TRIANGLE: f64 = 300.0;
 const PER_PAIR: f64 = 600.0;
+const PER_PAIR_MENDED: f64 = 900.0;
 const PER_SCANNED_PAIR: f64 = 160.0;
 const PER_HIT: f64 = 70.0;
 const PER_FLIP: f64 = 450.0;
@@ -22,8 +23,9 @@ const PER_BRICK: f64 = 60_000.0;
 const PER_CROSSING_PLACED: f64 = 1400.0;
 const PER_TRIANGLE_PROVED: f64 = 600.0;
 /// Share of a stage that more threads make shorter.
-const PARALLEL: [(Stage, f64); 6] = [
+const PARALLEL: [(Stage, f64); 7] = [
     (Stage::Ingest, 0.5),
+    (Stage::Bridge, 0.3),
     (Stage::Scan, 0.9),
     (Stage::Patch, 0.5),
     (Stage::Sign, 0.8),
@@ -42,6 +44,8 @@ pub fn stages(sums: &SoupSums, counts: &Counts, threads: usize) -> BTreeMap<Stag
                 + PER_TRIANGLE * sums.stats.triangles as f64
                 + PER_PAIR * pairs
         }
+        Stage::Bridge if sums.rims.edges == 0.0 => 0.0,
+        Stage::Bridge => PER_PAIR_MENDED * pairs,
         Stage::Scan => PER_SCANNED_PAIR * pairs + PER_HIT * counts.hits as f64,
         Stage::Patch => {
             PER_FLIP * counts.at_most.flips as f64 + PER_ODD_FACE * counts.at_most.odd_faces as f64

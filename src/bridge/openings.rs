@@ -1,0 +1,199 @@
+//! Decides what becomes of each shell: it stays, its openings are filled, or it becomes walls.
+//!
+//! An opening is wanted if its flat fill would add more than [`WANTED_SHARE`] to the area of its
+//! shell: a basket, a bowl, a lampshade, an open drawer, and every free panel, whose fill would be
+//! the panel itself. A shell with a wanted opening becomes walls. All other openings are filled,
+//! where their rims close by themselves.
+//!
+//! In:         rims by shell, with what is covered of each.
+//! Out:        fates of sheets, and fills in the bins.
+//! Memory:     the rims of one shell.
+
+use glam::DVec3;
+
+use crate::bridge::loops::{MOST_RIMS, Opening, ShellRim, trace};
+use crate::bridge::rims::RimEdge;
+use crate::bridge::shells::{Cover, RimOfShell, Shells};
+use crate::bridge::{Added, FilledHole, HoleRule, MendOptions, MendStats};
+use crate::octree::Domain;
+use crate::octree::points::pack_point;
+use crate::store::{Resources, Spool, StoreError};
+
+/// Share of its shell's area beyond which a flat fill would be no repair.
+const WANTED_SHARE: f64 = 0.1;
+
+/// Where a flat fill has more of its shell's area, the shell is a panel: its fill is the shell.
+const PANEL_SHARE: f64 = 2.0 / 3.0;
+
+/// A panel lies on a face where so much of its rim does.
+const LYING_SHARE: f64 = 0.9;
+
+/// More than this of a rim on another part's face: the two run flush there.
+const FLUSH_SHARE: f64 = 0.2;
+
+/// Less open rim than this is left to the patch.
+const LEAST_OPEN_CELLS: f64 = 4.0;
+
+/// Holes that are told of one by one.
+const MOST_TOLD: usize = 16;
+
+/// Decides about all shells.
+pub fn decide(
+    rims: &Spool<RimEdge>,
+    shells: &mut Shells,
+    options: &MendOptions,
+    added: &mut Added,
+    stats: &mut MendStats,
+    resources: &Resources,
+) -> Result<(), StoreError> {
+    let Some(by_shell) = shells.take_rims() else { return Ok(()) };
+    let mut sorted = by_shell.finish()?;
+    let mut next = sorted.next()?;
+    let mut numbers: Vec<u32> = Vec::new();
+    while let Some(RimOfShell { shell, .. }) = next {
+        if resources.monitor.cancelled() {
+            return Err(StoreError::Cancelled);
+        }
+        numbers.clear();
+        let mut count = 0;
+        while let Some(of_shell) = next
+            && of_shell.shell == shell
+        {
+            if numbers.len() < MOST_RIMS {
+                numbers.push(of_shell.rim);
+            }
+            count += 1;
+            next = sorted.next()?;
+        }
+        if count > MOST_RIMS as u64 {
+            stats.crowded_rims += count;
+            continue;
+        }
+        let rims = read_rims(rims, &numbers, shells)?;
+        Decision { rims: &rims, options, stats }.make(shells, added)?;
+    }
+    Ok(())
+}
+
+fn read_rims(
+    rims: &Spool<RimEdge>,
+    numbers: &[u32],
+    shells: &mut Shells,
+) -> Result<Vec<ShellRim>, StoreError> {
+    let mut of_shell = Vec::with_capacity(numbers.len());
+    let mut edges = Vec::new();
+    for &number in numbers {
+        edges.clear();
+        rims.read(number.into(), 1, &mut edges)?;
+        let (edge, cover) = (edges[0], shells.cover(number)?);
+        let packed = |i: usize| pack_point(on_lattice(edge.corners[i], shells.domain));
+        of_shell.push(ShellRim { edge, ends: [packed(0), packed(1)], cover });
+    }
+    Ok(of_shell)
+}
+
+fn on_lattice(corner: [f64; 3], domain: &Domain) -> [u32; 3] {
+    domain.snap(corner).map(|c| c as u32)
+}
+
+/// A decision about one shell.
+struct Decision<'d> {
+    rims: &'d [ShellRim],
+    options: &'d MendOptions,
+    stats: &'d mut MendStats,
+}
+
+impl Decision<'_> {
+    fn make(&mut self, shells: &mut Shells, added: &mut Added) -> Result<(), StoreError> {
+        let open_length: f64 = self.rims.iter().map(ShellRim::open_length).sum();
+        let least = LEAST_OPEN_CELLS * shells.domain.cell_size();
+        if open_length < least.max(2.0 * self.options.max_gap) {
+            return Ok(());
+        }
+        self.stats.open_shells += 1;
+        let mut sheets: Vec<u32> = self.rims.iter().map(|rim| rim.edge.sheet).collect();
+        sheets.sort_unstable();
+        sheets.dedup();
+        let shell = shells.together(&sheets)?;
+        let openings = trace(self.rims);
+        let wanted: Vec<&Opening> =
+            openings.iter().filter(|opening| self.is_wanted(opening, shell.area)).collect();
+        if !wanted.is_empty() || self.is_held_panel(&sheets, shell.area) {
+            self.stats.walled_shells += 1;
+            self.stats.walled_triangles += shell.triangles;
+            self.stats.walled_area += shell.area;
+            self.stats.wanted_openings += wanted.len() as u64;
+            let is_free = wanted.iter().all(|opening| opening.held(self.rims)[0] < 0.5);
+            return shells.wall(&sheets, is_free);
+        }
+        openings.iter().try_for_each(|opening| self.close(opening, added))
+    }
+
+    fn is_wanted(&self, opening: &Opening, area: f64) -> bool {
+        let share = opening.area(self.rims) / area;
+        let [_, lying] = opening.held(self.rims);
+        match self.options.holes {
+            // A panel that lies on a face is a part of it, as a decal is.
+            _ if share > PANEL_SHARE => lying < LYING_SHARE,
+            HoleRule::All => false,
+            // Cut open by a part that runs flush with it, it is no vessel: parts unite.
+            HoleRule::Auto if lying > FLUSH_SHARE && lying < LYING_SHARE => false,
+            HoleRule::Auto => share > WANTED_SHARE,
+            HoleRule::UpTo(size) => {
+                let [lo, hi] = bounds(&opening.points(self.rims));
+                lo.distance(hi) > size
+            }
+        }
+    }
+
+    /// Whether the shell is one sheet, held by a part of its rim, that a fill of the whole rim
+    /// would only double.
+    fn is_held_panel(&self, sheets: &[u32], area: f64) -> bool {
+        if sheets.len() > 1 {
+            return false;
+        }
+        let bare: Vec<ShellRim> =
+            self.rims.iter().map(|rim| ShellRim { cover: Cover::default(), ..*rim }).collect();
+        let lying: f64 = self.rims.iter().map(|r| r.cover.lying * r.edge.length()).sum();
+        let length: f64 = self.rims.iter().map(|rim| rim.edge.length()).sum();
+        let whole: f64 = trace(&bare).iter().map(|opening| opening.area(&bare)).sum();
+        whole > PANEL_SHARE * area && lying < LYING_SHARE * length
+    }
+
+    /// Fills an opening if its rim closes by itself.
+    fn close(&mut self, opening: &Opening, added: &mut Added) -> Result<(), StoreError> {
+        let [held, _] = opening.held(self.rims);
+        if opening.widest_jump > 0.0 || opening.steps.len() < 3 || held > 0.5 {
+            let lengths = opening.steps.iter().map(|step| self.rims[step.rim].open_length());
+            self.stats.patched_length += lengths.sum::<f64>();
+            return Ok(());
+        }
+        let points = opening.points(self.rims);
+        let first = &self.rims[opening.steps[0].rim].edge;
+        let like = (first.part, first.material);
+        let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+        let mut area = 0.0;
+        for (i, &begin) in points.iter().enumerate() {
+            let end = points[(i + 1) % points.len()];
+            area += 0.5 * (begin - middle).cross(end - middle).length();
+            added.push([end, begin, middle].map(|p| p.to_array()), like)?;
+        }
+        self.tell(&points, area);
+        Ok(())
+    }
+
+    fn tell(&mut self, points: &[DVec3], area: f64) {
+        self.stats.filled_holes += 1;
+        self.stats.filled_area += area;
+        let [lo, hi] = bounds(points).map(|p| p.to_array());
+        let holes = &mut self.stats.widest_holes;
+        holes.push(FilledHole { lo, hi, area, edges: points.len() as u64 });
+        holes.sort_by(|a, b| b.area.total_cmp(&a.area));
+        holes.truncate(MOST_TOLD);
+    }
+}
+
+fn bounds(points: &[DVec3]) -> [DVec3; 2] {
+    let lo = points.iter().fold(DVec3::INFINITY, |lo, p| lo.min(*p));
+    [lo, points.iter().fold(DVec3::NEG_INFINITY, |hi, p| hi.max(*p))]
+}

@@ -1,0 +1,116 @@
+//! Finds the surface that would be lost: triangles whose hits lie on edges with both ends outside.
+//!
+//! Such edges cross a wall thinner than a cell, or a sheet that no wall stands for and that a patch
+//! went along.
+//!
+//! In:      hits, flips, and what the outside reaches.
+//! Out:     [`LostHits`] by source number, from each brick on its own.
+//! Memory:  the share; a brick per worker.
+
+use crate::octree::{
+    ArchivedHitBrick, Flips, HitEdge, LINES, LostHits, ROWS, Regions, SIDE, SourcePlane,
+    decode_hits, edge_position, find_regions,
+};
+use crate::sign::SignError;
+use crate::sign::flooded::{Flooded, OUTSIDE};
+use crate::sign::load::{LoadItem, LoadItems, Loaded};
+use crate::store::{BrickFile, Resources, Sorter, ordered_by_weight};
+
+/// Cosine of the angle between the sides of a wall: its edge is sharper than any ridge.
+const PARALLEL: f64 = 0.8;
+
+/// Corners of the largest speck.
+const SPECK_CORNERS: u32 = 8;
+
+/// Finds the lost hits of all bricks.
+///
+/// # Errors
+/// [`SignError`].
+pub fn find_lost(
+    hits: &BrickFile,
+    flips: &Flips,
+    flooded: &Flooded,
+    resources: &Resources,
+) -> Result<Sorter<LostHits>, SignError> {
+    let mut items = LoadItems::new(hits, flips, resources);
+    let mut bricks = flooded.by_brick();
+    let mut lost = Sorter::new(resources.scratch, resources.share_bytes / 4);
+    ordered_by_weight(
+        resources.pool,
+        resources.scales(|(item, _): &(LoadItem, Vec<u8>)| item.weight_bytes(hits)),
+        || {
+            let Some(load) = items.next()? else { return Ok(None) };
+            let brick = bricks.next()?.filter(|brick| brick.key == load.brick.0);
+            let (position, expected) = (load.brick.position(), "the bricks of the flood");
+            let brick = brick.ok_or(SignError::Contradiction { brick: position, expected })?;
+            let regions = bricks.regions_of(&brick)?;
+            Ok(Some((load, regions)))
+        },
+        Loaded::default,
+        |loaded, (item, known)| {
+            // Nothing is lost where the outside does not come.
+            if known.iter().all(|region| region & OUTSIDE == 0) {
+                return Ok(Vec::new());
+            }
+            let Some(view) = loaded.load(hits, &item)? else { return Ok(Vec::new()) };
+            let regions = find_regions(&loaded.barrier);
+            // A wall that is left as specks is lost as well.
+            let specks = find_specks(&regions);
+            let is_outside = |at| {
+                let region = usize::from(regions.at(at));
+                known[region] & OUTSIDE != 0 || specks[region]
+            };
+            Ok(lost_of(decode_hits(&view)?, is_outside))
+        },
+        |found: Vec<LostHits>| Ok::<(), SignError>(lost.extend(&found)?),
+    )?;
+    Ok(lost)
+}
+
+/// Which regions are specks: of few corners, all within the brick.
+fn find_specks(regions: &Regions) -> Vec<bool> {
+    let mut corners = vec![0; usize::from(regions.count)];
+    for row in 0..ROWS {
+        let is_border = [row % LINES, row / LINES].iter().any(|&c| c == 0 || c == SIDE);
+        for (bits, region) in regions.row(row) {
+            let at_border = is_border || bits & (1 | 1 << SIDE) != 0;
+            let count = if at_border { SPECK_CORNERS + 1 } else { bits.count_ones() };
+            corners[usize::from(region)] += count;
+        }
+    }
+    corners.into_iter().map(|count| count <= SPECK_CORNERS).collect()
+}
+
+/// Whether the first and the last hit lie on planes that could be the sides of a wall. Those of a
+/// ridge are no loss: every ridge passes edges whose ends are both outside.
+fn are_parallel(brick: &ArchivedHitBrick, hits: &[rkyv::rend::u32_le]) -> bool {
+    let (Some(first), Some(last)) = (hits.first(), hits.last()) else { return false };
+    let normal = |hit: &rkyv::rend::u32_le| {
+        SourcePlane::from(&brick.planes[hit.to_native() as usize]).normal.map(f64::from)
+    };
+    let (a, b) = (normal(first), normal(last));
+    let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    cosine.abs() >= PARALLEL
+}
+
+fn lost_of(brick: &ArchivedHitBrick, is_outside: impl Fn([usize; 3]) -> bool) -> Vec<LostHits> {
+    let mut counts = vec![0_u32; brick.planes.len()];
+    let mut first = 0;
+    for edge in brick.edges.iter() {
+        let edge = HitEdge { bits: edge.bits.to_native(), signed_sum: 0 };
+        let hits = first..first + edge.kept();
+        first = hits.end;
+        let (axis, at) = edge_position(edge.edge());
+        let mut beyond = at;
+        beyond[axis] += 1;
+        let hits = &brick.hits[hits];
+        let is_lost = at.iter().all(|&c| c < SIDE) && is_outside(at) && is_outside(beyond);
+        if is_lost && are_parallel(brick, hits) {
+            for hit in hits {
+                counts[hit.to_native() as usize] += 1;
+            }
+        }
+    }
+    let planes = counts.into_iter().zip(brick.planes.iter()).filter(|(count, _)| *count > 0);
+    planes.map(|(count, plane)| LostHits { source: plane.source.to_native(), count }).collect()
+}

@@ -1,0 +1,82 @@
+//! Walls thinner than a cell: thickened, never torn; dropped on demand.
+
+mod support;
+
+use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, sphere, transform};
+use brickmend::repair::{Limits, Settings, ThinRule};
+use glam::{DMat3, DVec3};
+
+use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
+
+/// A plate of 1 x 1 and so many cells of depth 6, whose cells are about 1/57 wide, in some pose.
+fn plate(cells: f64, random: &mut Random) -> Vec<Corners> {
+    let soup = cuboid([0.0; 3], [1.0, 1.0, cells / 57.0]);
+    transform(&soup, rotation(random), DVec3::from(random.point()))
+}
+
+#[test]
+fn a_plate_far_thinner_than_a_cell_stays_whole() {
+    let mut random = Random::new(8);
+    for cells in [0.1, 0.3, 0.7, 3.0] {
+        for pose in 0..4 {
+            let (outcome, surface) =
+                repair_soup(&plate(cells, &mut random), &at_depth(6)).expect("a result");
+            // Tips may come off as specks; there is no hole.
+            let (parts, euler) = (surface.proof.components, surface.proof.euler_characteristic);
+            assert!(parts <= 12 && euler == 2 * parts as i64, "{cells}, {pose}: {parts} {euler}");
+            let told = surface.proof.volume / outcome.cell_size;
+            assert!(told > cells * 0.6 && told < cells + 2.6, "{cells} cells: {told}");
+            assert_eq!(outcome.thickened.triangles > 0, cells < 1.0, "{cells} cells");
+        }
+    }
+}
+
+#[test]
+fn on_demand_what_the_grid_misses_goes_and_is_told() {
+    let mut random = Random::new(9);
+    let settings = Settings { thin: ThinRule::Drop, ..at_depth(6) };
+    let mut soup = plate(0.02, &mut random);
+    soup.extend(sphere([4.0; 3], 0.5, 16));
+    let (outcome, surface) = repair_soup(&soup, &settings).expect("the sphere is left");
+    let ball = 4.0 / 3.0 * std::f64::consts::PI * 0.125;
+    assert!(surface.proof.volume < 1.05 * ball, "{}", surface.proof.volume);
+    assert_eq!(outcome.thickened.triangles, 0);
+    assert!(outcome.dropped.thin_edges > 0);
+}
+
+#[test]
+fn a_thick_solid_is_as_it_would_be_without_the_rule() {
+    let mut random = Random::new(10);
+    let turn = rotation(&mut random) * DMat3::from_diagonal(DVec3::new(1.0, 0.6, 0.3));
+    let soup = transform(&cuboid([-1.0; 3], [1.0; 3]), turn, DVec3::ZERO);
+    let workshop = Workshop::new();
+    let input = workshop.write(&soup, Encoding::Obj);
+    let bytes = [ThinRule::Thicken, ThinRule::Drop].map(|thin| {
+        let settings = Settings { thin, ..at_depth(7) };
+        let repaired =
+            workshop.repair(&input, "ply", &settings, &Limits::default()).expect("a result");
+        std::fs::read(repaired.path).expect("it is there")
+    });
+    assert!(bytes[0] == bytes[1]);
+}
+
+#[test]
+fn thickening_is_the_same_whatever_the_memory_and_the_threads() {
+    let workshop = Workshop::new();
+    let mut random = Random::new(11);
+    let mut soup = plate(0.4, &mut random);
+    soup.extend(sphere([2.0; 3], 0.3, 24));
+    let input = workshop.write(&soup, Encoding::Obj);
+    let limits = [
+        Limits::default(),
+        Limits { share_bytes: Some(16 << 10), ..Limits::default() },
+        Limits { threads: 8, ..Limits::default() },
+    ];
+    let bytes = limits.map(|limits| {
+        let repaired = workshop.repair(&input, "ply", &at_depth(7), &limits).expect("a result");
+        assert!(repaired.outcome.thickened.triangles > 0);
+        assert!(!repaired.path.with_extension("ply.brickmend").exists(), "nothing is left");
+        std::fs::read(repaired.path).expect("it is there")
+    });
+    assert!(bytes.iter().all(|other| *other == bytes[0]));
+}
