@@ -3,7 +3,7 @@
 mod support;
 
 use brickmend::mesh::shapes::{
-    Corners, Random, cuboid, rotation, shuffle, sphere, torus, transform,
+    Corners, Random, cuboid, rotation, shuffle, sphere, torus, transform, volume,
 };
 use brickmend::repair::{Limits, MaxHole, Outcome, Reach, Settings};
 use glam::{DMat3, DVec3};
@@ -132,14 +132,40 @@ fn a_small_hole_is_filled_and_a_bowl_stays_a_bowl() {
     let below = |height: f64| -> Vec<Corners> {
         ball.iter().copied().filter(|t| t.iter().all(|c| c[2] < height)).collect()
     };
-    let (outcome, surface) = with_holes(&below(0.95), MaxHole::Auto, 6);
-    assert_eq!((outcome.mend.filled_holes, outcome.mend.walled_shells), (1, 0));
-    assert_eq!(outcome.mend.widest_holes.len(), 1);
-    assert!(surface.proof.volume > 4.0, "{}", surface.proof.volume);
+    let (outcome, surface) = with_holes(&below(0.85), MaxHole::Auto, 7);
+    let mend = &outcome.mend;
+    assert_eq!((mend.filled_holes, mend.smooth_holes, mend.walled_shells), (1, 1, 0));
+    assert_eq!(mend.widest_holes.len(), 1);
+    let whole = surface.proof.volume / volume(&ball);
+    assert!((whole - 1.0).abs() < 3e-3, "the fill bulges: {whole}");
     let (outcome, surface) = with_holes(&below(0.1), MaxHole::Auto, 6);
     assert_eq!((outcome.mend.filled_holes, outcome.mend.walled_shells), (0, 1));
     let wall = outcome.mend.walled_area * 2.0 * outcome.cell_size;
     assert!((surface.proof.volume / wall - 1.0).abs() < 0.1, "{}", surface.proof.volume);
+}
+
+#[test]
+fn an_edge_that_runs_into_a_hole_is_continued() {
+    // Where two faces of a cube meet, a piece of each is missing.
+    let grid = |at: [f64; 3], u: [f64; 3], v: [f64; 3]| -> Vec<Corners> {
+        let (at, u, v) = (DVec3::from(at), DVec3::from(u) / 8.0, DVec3::from(v) / 8.0);
+        let corner = |i: u32, j: u32| at + u * f64::from(i) + v * f64::from(j);
+        let squares =
+            (0..64).map(|n| (n % 8, n / 8)).filter(|(i, j)| !(3..5).contains(i) || *j > 1);
+        let cut = |(i, j)| {
+            let [p, q, r, s] =
+                [corner(i, j), corner(i + 1, j), corner(i + 1, j + 1), corner(i, j + 1)];
+            [[p, q, r].map(Into::into), [p, r, s].map(Into::into)]
+        };
+        squares.flat_map(cut).collect()
+    };
+    let sides: Vec<Corners> = cube_without(&[(2, 1), (1, 0)]);
+    let mut soup = sides;
+    soup.extend(grid([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]));
+    soup.extend(grid([0.0, 0.0, 1.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]));
+    let (outcome, surface) = with_holes(&soup, MaxHole::Auto, 7);
+    assert!(outcome.mend.filled_holes >= 1 && outcome.mend.walled_shells == 0);
+    assert!((surface.proof.volume - 1.0).abs() < 1e-3, "{}", surface.proof.volume);
 }
 
 #[test]

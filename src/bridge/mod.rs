@@ -85,6 +85,8 @@ pub struct MendOptions {
     pub max_gap: f64,
     /// Thickness of walls.
     pub thickness: f64,
+    /// Smaller angles between triangles are noise, degrees.
+    pub crease_deg: f64,
     /// Box of the soup: walls reach beyond it by half their thickness at most.
     pub bounds: SnapBox,
 }
@@ -106,6 +108,8 @@ pub struct MendStats {
     pub added_triangles: u64,
     /// Openings that were filled.
     pub filled_holes: u64,
+    /// Of these, those that go on smoothly as the surface around does.
+    pub smooth_holes: u64,
     /// Area of the fills.
     pub filled_area: f64,
     /// Openings that were left open since they are wanted.

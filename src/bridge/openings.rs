@@ -11,12 +11,13 @@
 
 use glam::DVec3;
 
+use crate::bridge::fill::{FillKind, FillOptions, RimLoop, fill_loop};
 use crate::bridge::loops::{MOST_RIMS, Opening, ShellRim, trace};
-use crate::bridge::rims::RimEdge;
+use crate::bridge::rims::{RimEdge, TURNED};
 use crate::bridge::shells::{Cover, RimOfShell, Shells};
 use crate::bridge::{Added, FilledHole, HoleRule, MendOptions, MendStats};
-use crate::octree::Domain;
 use crate::octree::points::pack_point;
+use crate::octree::{Domain, SnapBox};
 use crate::store::{Resources, Spool, StoreError};
 
 /// Share of its shell's area beyond which a flat fill would be no repair.
@@ -33,6 +34,9 @@ const FLUSH_SHARE: f64 = 0.2;
 
 /// Less open rim than this is left to the patch.
 const LEAST_OPEN_CELLS: f64 = 4.0;
+
+/// Cells at the border of the grid that fills keep free.
+const FREE_CELLS: i64 = 2;
 
 /// Holes that are told of one by one.
 const MOST_TOLD: usize = 16;
@@ -70,7 +74,9 @@ pub fn decide(
             continue;
         }
         let rims = read_rims(rims, &numbers, shells)?;
-        Decision { rims: &rims, options, stats }.make(shells, added)?;
+        let cell = shells.domain.cell_size();
+        let room = shells.domain.room(FREE_CELLS);
+        Decision { rims: &rims, options, stats, cell, room }.make(shells, added)?;
     }
     Ok(())
 }
@@ -101,6 +107,10 @@ struct Decision<'d> {
     rims: &'d [ShellRim],
     options: &'d MendOptions,
     stats: &'d mut MendStats,
+    /// Side of a cell.
+    cell: f64,
+    /// Fills stay in it.
+    room: SnapBox,
 }
 
 impl Decision<'_> {
@@ -164,26 +174,44 @@ impl Decision<'_> {
     fn close(&mut self, opening: &Opening, added: &mut Added) -> Result<(), StoreError> {
         let [held, _] = opening.held(self.rims);
         if opening.widest_jump > 0.0 || opening.steps.len() < 3 || held > 0.5 {
-            let lengths = opening.steps.iter().map(|step| self.rims[step.rim].open_length());
-            self.stats.patched_length += lengths.sum::<f64>();
+            self.stats.patched_length += self.length(opening);
             return Ok(());
         }
-        let points = opening.points(self.rims);
-        let first = &self.rims[opening.steps[0].rim].edge;
-        let like = (first.part, first.material);
-        let middle = points.iter().sum::<DVec3>() / points.len() as f64;
+        let rim = RimLoop { points: opening.points(self.rims), opposite: self.opposite(opening) };
+        let options = FillOptions { cell: self.cell, crease_deg: self.options.crease_deg };
+        let Some(fill) = fill_loop(&rim, &options) else {
+            self.stats.patched_length += self.length(opening);
+            return Ok(());
+        };
+        let first = opening.steps[0];
+        let edge = &self.rims[first.rim].edge;
+        // A sheet runs along its rim one way, what closes it the other.
+        let is_turned = first.backward == (edge.flags & TURNED == 0);
+        let (lo, hi) = (DVec3::from(self.room.lo), DVec3::from(self.room.hi));
         let mut area = 0.0;
-        for (i, &begin) in points.iter().enumerate() {
-            let end = points[(i + 1) % points.len()];
-            area += 0.5 * (begin - middle).cross(end - middle).length();
-            added.push([end, begin, middle].map(|p| p.to_array()), like)?;
+        for corners in fill.triangles {
+            let [p, q, r] = corners.map(|corner| corner.clamp(lo, hi));
+            area += 0.5 * (q - p).cross(r - p).length();
+            let corners = if is_turned { [p, q, r] } else { [q, p, r] };
+            added.push(corners.map(|p| p.to_array()), (edge.part, edge.material))?;
         }
-        self.tell(&points, area);
+        self.tell(&rim.points, area, fill.kind);
         Ok(())
     }
 
-    fn tell(&mut self, points: &[DVec3], area: f64) {
+    /// The third corners of the triangles along an opening.
+    fn opposite(&self, opening: &Opening) -> Vec<Option<DVec3>> {
+        opening.steps.iter().map(|step| Some(self.rims[step.rim].edge.opposite())).collect()
+    }
+
+    /// Length of an opening that no rim faces.
+    fn length(&self, opening: &Opening) -> f64 {
+        opening.steps.iter().map(|step| self.rims[step.rim].open_length()).sum()
+    }
+
+    fn tell(&mut self, points: &[DVec3], area: f64, kind: FillKind) {
         self.stats.filled_holes += 1;
+        self.stats.smooth_holes += u64::from(kind == FillKind::Smooth);
         self.stats.filled_area += area;
         let [lo, hi] = bounds(points).map(|p| p.to_array());
         let holes = &mut self.stats.widest_holes;

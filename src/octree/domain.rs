@@ -175,6 +175,14 @@ impl Domain {
         (1_u32 << self.depth).div_ceil(SIDE as u32)
     }
 
+    /// The box of the grid without so many cells at its border, model units.
+    #[must_use]
+    pub fn room(&self, free_cells: i64) -> SnapBox {
+        let cell = i64::from(self.cell_units);
+        let [lo, hi] = [free_cells * cell, (cell << self.depth) - free_cells * cell];
+        SnapBox { lo: self.to_model([lo; 3]), hi: self.to_model([hi; 3]) }
+    }
+
     /// The nearest lattice point to a point of the model's box.
     #[must_use]
     #[inline]

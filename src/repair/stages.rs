@@ -302,6 +302,7 @@ impl Run<'_> {
             },
             max_gap: in_model_units(settings.max_gap)?,
             thickness: in_model_units(settings.sheet_thickness)?,
+            crease_deg: settings.crease_deg,
             bounds: *bounds,
         })
     }
