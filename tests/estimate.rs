@@ -280,6 +280,8 @@ fn the_documentation_names_every_field_and_no_other() {
         let conditional = [
             "settings.depth.levels",
             "settings.depth.tolerance",
+            "settings.depth.auto",
+            "settings.depth.auto.max_depth",
             "settings.decimate.length",
             "settings.max_gap.length",
             "settings.sheet_thickness.length",

@@ -10,9 +10,11 @@ use support::schema::check_document;
 use support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 38] = [
+const CONDITIONAL: [&str; 40] = [
     "input.dense_box.lo",
     "input.dense_box.hi",
+    "settings.depth.auto",
+    "settings.depth.auto.max_depth",
     "settings.depth.tolerance",
     "settings.depth.tolerance.length",
     "settings.depth.tolerance.length.model",

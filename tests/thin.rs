@@ -3,7 +3,7 @@
 mod support;
 
 use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, sphere, transform};
-use brickmend::repair::{Limits, Settings, ThinRule};
+use brickmend::repair::{Depth, Limits, Settings, ThinRule};
 use glam::{DMat3, DVec3};
 
 use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
@@ -79,4 +79,32 @@ fn thickening_is_the_same_whatever_the_memory_and_the_threads() {
         std::fs::read(repaired.path).expect("it is there")
     });
     assert!(bytes.iter().all(|other| *other == bytes[0]));
+}
+
+#[test]
+fn the_grid_gets_deeper_by_itself_where_walls_are_thin_and_says_so() {
+    let auto = |soup: &[Corners], max_depth| {
+        let settings = Settings { depth: Depth::Auto { max_depth }, ..Settings::default() };
+        repair_soup(soup, &settings).expect("a result")
+    };
+    let mut random = Random::new(12);
+    for scale in [1.0, 1e-6, 1e6] {
+        // A wall of half a cell at the depth that the diagonal asks for.
+        let box_of = |lo: f64, hi: f64| cuboid([lo; 3], [hi; 3]);
+        let mut soup = box_of(0.0, 1.0);
+        soup.extend(cuboid([1.2, 0.0, 0.0], [1.205, 1.0, 1.0]));
+        let turn = rotation(&mut random) * DMat3::from_diagonal(DVec3::splat(scale));
+        let soup = transform(&soup, turn, DVec3::ZERO);
+        let (outcome, surface) = auto(&soup, 12);
+        let volume = surface.proof.volume / scale.powi(3);
+        assert!((volume - 1.005).abs() < 3e-3, "{scale}: {volume}, {}", outcome.depth_reason);
+        assert_eq!(surface.proof.components, 2);
+        assert!(outcome.depth_reason.contains("thinner"), "{}", outcome.depth_reason);
+        let depth = outcome.grid.depth;
+        let (outcome, _) = auto(&soup, depth - 1);
+        assert_eq!(outcome.grid.depth, depth - 1);
+        assert!(outcome.thickened.triangles > 0);
+    }
+    let (outcome, _) = auto(&cuboid([0.0; 3], [1.0; 3]), 12);
+    assert_eq!((outcome.grid.depth, outcome.thickened.triangles), (8, 0));
 }

@@ -12,14 +12,14 @@ use clap::{Args, ValueEnum};
 #[derive(Debug, Args)]
 #[command(next_help_heading = "Result")]
 pub struct ResultArguments {
-    /// Octree depth, 4 to 15: 2^DEPTH cells a side.
-    #[arg(long, value_parser = clap::value_parser!(u32).range(4..=15))]
-    depth: Option<u32>,
+    /// Octree depth, 4 to 15: 2^DEPTH cells a side; or auto: cells of 0.4% of the bounding box
+    /// diagonal, and deeper where much of the model is thinner than a cell. [default: auto]
+    #[arg(long, value_parser = parse_depth)]
+    depth: Option<DepthArgument>,
     /// Largest deviation, in model units or % of the bounding box diagonal; chooses the depth.
-    /// [default: 0.2%]
     #[arg(long, value_name = "LENGTH", conflicts_with = "depth")]
     tolerance: Option<Length>,
-    /// Deepest depth that --tolerance may choose.
+    /// Deepest depth that may be chosen.
     #[arg(long, default_value_t = Depth::DEFAULT_MAX,
           value_parser = clap::value_parser!(u32).range(4..=15))]
     max_depth: u32,
@@ -30,7 +30,7 @@ pub struct ResultArguments {
     #[arg(long, value_enum, default_value_t = SheetRuleName::Thicken)]
     sheets: SheetRuleName,
     /// What becomes of walls thinner than a cell.
-    #[arg(long, value_enum, default_value_t = ThinRuleName::Thicken)]
+    #[arg(long, value_enum, default_value_t = ThinRuleName::Deeper)]
     thin: ThinRuleName,
     /// Thickness of the walls that sheets without thickness become; in cells (2cells), model units,
     /// or % of the bounding box diagonal.
@@ -98,6 +98,8 @@ enum SheetRuleName {
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum ThinRuleName {
+    /// With --depth auto the grid gets deeper; what is thin still is thickened.
+    Deeper,
     /// They become as thick as sheets do.
     Thicken,
     /// They go where the grid misses them, and are counted.
@@ -129,12 +131,11 @@ impl From<MethodName> for Method {
 
 impl ResultArguments {
     pub fn settings(&self) -> Settings {
+        let max_depth = self.max_depth;
         let depth = match (self.depth, self.tolerance) {
-            (Some(depth), _) => Depth::Levels(depth),
-            (None, tolerance) => Depth::Tolerance {
-                length: tolerance.unwrap_or(Length::Percent(0.2)),
-                max_depth: self.max_depth,
-            },
+            (Some(DepthArgument::Levels(depth)), _) => Depth::Levels(depth),
+            (_, Some(length)) => Depth::Tolerance { length, max_depth },
+            _ => Depth::Auto { max_depth },
         };
         let fill_rule = match self.fill_rule {
             FillRuleName::Solid => FillRule::Solid,
@@ -146,6 +147,7 @@ impl ResultArguments {
             SheetRuleName::KeepFins => SheetRule::KeepFins,
         };
         let thin = match self.thin {
+            ThinRuleName::Deeper => ThinRule::Deeper,
             ThinRuleName::Thicken => ThinRule::Thicken,
             ThinRuleName::Drop => ThinRule::Drop,
         };
@@ -189,6 +191,21 @@ fn parse_length(text: &str) -> Result<Reach, String> {
         Ok(length) => Ok(length),
         Err(error) => Err(error.to_string()),
     }
+}
+
+/// What `--depth` says.
+#[derive(Clone, Copy, Debug)]
+enum DepthArgument {
+    Auto,
+    Levels(u32),
+}
+
+fn parse_depth(text: &str) -> Result<DepthArgument, String> {
+    if text == "auto" {
+        return Ok(DepthArgument::Auto);
+    }
+    let levels = text.parse().ok().filter(|levels| Depth::RANGE.contains(levels));
+    levels.map(DepthArgument::Levels).ok_or_else(|| "expected auto, or 4 to 15".to_owned())
 }
 
 fn parse_angle(text: &str) -> Result<f64, String> {

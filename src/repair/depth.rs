@@ -41,20 +41,20 @@ pub fn choose_domain(
         Domain::around(bounds, depth, single)
             .map_err(|possible_depth| RepairError::OutputTooCoarse { depth, possible_depth })
     };
-    match depth {
-        Depth::Levels(depth) => around(depth),
-        Depth::Tolerance { length, max_depth } => {
-            let tolerance = length
-                .in_model_units(model)
-                .ok_or_else(|| RepairError::NoUnit { path: input.to_path_buf() })?;
-            let mut domain = around(*Depth::RANGE.start())?;
-            for depth in *Depth::RANGE.start() + 1..=max_depth {
-                if domain.cell_size() <= 2.0 * tolerance {
-                    break;
-                }
-                domain = around(depth)?;
-            }
-            Ok(domain)
+    let (length, max_depth) = match depth {
+        Depth::Levels(depth) => return around(depth),
+        Depth::Auto { max_depth } => (Depth::DEFAULT_TOLERANCE, max_depth),
+        Depth::Tolerance { length, max_depth } => (length, max_depth),
+    };
+    let tolerance = length
+        .in_model_units(model)
+        .ok_or_else(|| RepairError::NoUnit { path: input.to_path_buf() })?;
+    let mut domain = around(*Depth::RANGE.start())?;
+    for depth in *Depth::RANGE.start() + 1..=max_depth {
+        if domain.cell_size() <= 2.0 * tolerance {
+            break;
         }
+        domain = around(depth)?;
     }
+    Ok(domain)
 }

@@ -3,6 +3,7 @@
 use std::collections::BTreeMap;
 
 use crate::monitor::{Counter, Gauge, Monitor};
+use crate::repair::deeper::depth_reason;
 use crate::repair::outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, Verdict,
@@ -59,6 +60,7 @@ pub fn conclude(
         },
         settings: Settings { decimate: level.decimate, ..run.settings },
         grid: domain,
+        depth_reason: depth_reason(run.settings.depth, &domain, &findings.trials),
         cell_size: domain.cell_size(),
         found: Found {
             settle: findings.settle,

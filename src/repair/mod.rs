@@ -8,6 +8,7 @@
 //! Fails:      [`RepairError`], one message with place, and the work folder kept or removed.
 
 mod choose;
+mod deeper;
 mod depth;
 mod error;
 mod estimate;
@@ -24,6 +25,7 @@ mod standing;
 mod step;
 mod workspace;
 
+pub use deeper::DepthTrial;
 pub use error::{Blame, RepairError};
 pub use estimate::{Bounds, Counts, DiskSteps, ESTIMATE_VERSION, Estimate, estimate};
 pub use length::{Length, LengthError, Reach};

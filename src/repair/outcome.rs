@@ -168,6 +168,8 @@ pub struct Outcome {
     pub settings: Settings,
     /// The grid.
     pub grid: Domain,
+    /// Why it is as deep as it is.
+    pub depth_reason: String,
     /// Side of a cell, model units.
     pub cell_size: f64,
     /// Defects found.

@@ -359,7 +359,14 @@ impl Run<'_> {
         if let (None, Some(written)) = (workspace.next_step(), workspace.written()) {
             check_output(workspace.part(), &written, workspace.scratch())?;
         }
-        while let Some(step) = workspace.next_step() {
+        loop {
+            if let Some(domain) = findings.deeper.take() {
+                self.recording.note(&format!("beginning anew at depth {}", domain.depth));
+                findings.domain = Some(domain);
+                *handles = Handles::default();
+                workspace.go_back_to(Step::Bin, to_text(findings))?;
+            }
+            let Some(step) = workspace.next_step() else { break };
             if self.recording.cancelled() {
                 return Err(StoreError::Cancelled.into());
             }

@@ -16,6 +16,11 @@ use crate::store::Backing;
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Depth {
+    /// Cells of 0.4 % of the diagonal; deeper where much of the model is thinner than a cell.
+    Auto {
+        /// The deepest level that may be chosen.
+        max_depth: u32,
+    },
     /// 2^levels cells a side.
     Levels(u32),
     /// The smallest depth whose cells are at most twice this length, up to `max_depth`.
@@ -30,19 +35,22 @@ pub enum Depth {
 impl Depth {
     /// Shallowest and deepest grids.
     pub const RANGE: std::ops::RangeInclusive<u32> = 4..=15;
-    /// Until depth is chosen by predicted features: this tolerance, at most this depth.
-    pub const DEFAULT: Self =
-        Self::Tolerance { length: Length::Percent(0.2), max_depth: Self::DEFAULT_MAX };
-    /// The deepest level chosen by tolerance unless the user allows more.
-    pub const DEFAULT_MAX: u32 = 10;
+    /// Chosen by the model.
+    pub const DEFAULT: Self = Self::Auto { max_depth: Self::DEFAULT_MAX };
+    /// The tolerance that the grid begins with when it is chosen by the model.
+    pub const DEFAULT_TOLERANCE: Length = Length::Percent(0.2);
+    /// The deepest level that is chosen unless the user allows more.
+    pub const DEFAULT_MAX: u32 = 12;
 }
 
 /// What becomes of walls thinner than a cell.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ThinRule {
-    /// They become as thick as sheets do.
+    /// The grid gets deeper where its depth is chosen by the model; what is thin still is thickened.
     #[default]
+    Deeper,
+    /// They become as thick as sheets do.
     Thicken,
     /// They go where the grid misses them.
     Drop,
@@ -109,7 +117,7 @@ impl Default for Settings {
             depth: Depth::DEFAULT,
             fill_rule: FillRule::Solid,
             sheets: SheetRule::Thicken,
-            thin: ThinRule::Thicken,
+            thin: ThinRule::Deeper,
             max_hole: MaxHole::Auto,
             max_gap: Reach::Cells(2.0),
             sheet_thickness: Reach::Cells(2.0),

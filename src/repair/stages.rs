@@ -18,12 +18,13 @@ use crate::octree::{Domain, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::choose::{Trials, most_trials};
+use crate::repair::deeper::{DepthTrial, goes_deeper};
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
 use crate::repair::length::Reach;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
-use crate::repair::settings::{MaxHole, ThinRule};
+use crate::repair::settings::{Depth, MaxHole, ThinRule};
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
@@ -44,7 +45,7 @@ pub struct FinishedLevel {
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Findings {
     soup: Option<SoupFacts>,
-    domain: Option<Domain>,
+    pub domain: Option<Domain>,
     pub measure: SoupMeasure,
     /// Copies that are in no bin.
     left_out: LeftOut,
@@ -53,6 +54,10 @@ pub struct Findings {
     pub settle: SettleStats,
     pub mend: MendStats,
     pub thickened: ThickenStats,
+    /// The depths that were tried.
+    pub trials: Vec<DepthTrial>,
+    /// The grid to begin anew with.
+    pub deeper: Option<Domain>,
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub sign: SignStats,
@@ -247,6 +252,9 @@ impl Run<'_> {
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
         findings.thickened = ThickenStats::default();
+        let depth = findings.domain().depth;
+        findings.trials.retain(|trial| trial.depth < depth);
+        findings.trials.push(DepthTrial { depth, thin_share: 0.0 });
         if self.settings.thin == ThinRule::Drop {
             return Ok(Vec::new());
         }
@@ -270,6 +278,9 @@ impl Run<'_> {
         let found = thicken(&soup, lost, &options, &domain, numbers, resources)?;
         let Some((thickened, stats)) = found else { return Ok(Vec::new()) };
         findings.thickened = stats;
+        if self.begins_deeper(findings, resources)? {
+            return Ok(Vec::new());
+        }
         // Made anew as a whole: what is noted on the way belongs to the steps of before.
         let resources = &Resources { checkpoints: &NoCheckpoints, ..*resources };
         handles.hits = None;
@@ -284,6 +295,32 @@ impl Run<'_> {
         files.push(flips.state().clone());
         files.extend(flooded.files());
         Ok(files)
+    }
+
+    /// Lays a deeper grid where that is of use.
+    fn begins_deeper(
+        &self,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<bool, RepairError> {
+        let share = findings.thickened.area / findings.measure.area.max(f64::MIN_POSITIVE);
+        if let Some(trial) = findings.trials.last_mut() {
+            trial.thin_share = share;
+        }
+        let settings = &self.settings;
+        let disk = (resources.scratch.peak_bytes(), self.limits.max_disk_bytes);
+        if !goes_deeper(findings, (settings.depth, settings.thin), disk) {
+            return Ok(false);
+        }
+        let depth = Depth::Levels(findings.domain().depth + 1);
+        let (bounds, thickness) = (&findings.soup().bounds, settings.sheet_thickness);
+        // An output that cannot hold a deeper grid is no reason to end the run.
+        match choose_domain(self.input, bounds, depth, thickness, self.format) {
+            Ok(domain) => findings.deeper = Some(domain),
+            Err(RepairError::OutputTooCoarse { .. }) => return Ok(false),
+            Err(error) => return Err(error),
+        }
+        Ok(true)
     }
 
     fn mend_options(&self, findings: &Findings) -> Result<MendOptions, RepairError> {

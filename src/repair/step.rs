@@ -128,9 +128,18 @@ impl Step {
             Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
             Self::Patch => &[HITS],
             Self::Flood => &[HITS, FLIPS],
-            Self::Thicken => {
-                &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES, HITS, FLIPS, FLOODED, REGIONS]
-            }
+            Self::Thicken => &[
+                SOUP,
+                BINS,
+                BIN_ENTRIES,
+                LEFT_OUT,
+                ADDED,
+                ADDED_ENTRIES,
+                HITS,
+                FLIPS,
+                FLOODED,
+                REGIONS,
+            ],
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS],
             Self::Choose | Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],

@@ -10,10 +10,16 @@ use brickmend::monitor::{Monitor, Stage};
 /// no later step reads may be there or not: it does not count.
 const NEEDED: [(Stage, &[&str]); 7] = [
     (Stage::Ingest, &["soup", "attributes", "bins", "drops", "facts"]),
-    (Stage::Bridge, &["attributes", "bins", "drops", "borders", "rims", "leftout", "added"]),
-    (Stage::Scan, &["attributes", "bins", "leftout", "added", "hits"]),
-    (Stage::Patch, &["attributes", "bins", "leftout", "added", "hits", "faces", "flips"]),
-    (Stage::Sign, &["attributes", "bins", "leftout", "added", "hits", "flips", "even", "signs"]),
+    (
+        Stage::Bridge,
+        &["soup", "attributes", "bins", "drops", "borders", "rims", "leftout", "added"],
+    ),
+    (Stage::Scan, &["soup", "attributes", "bins", "leftout", "added", "hits"]),
+    (Stage::Patch, &["soup", "attributes", "bins", "leftout", "added", "hits", "faces", "flips"]),
+    (
+        Stage::Sign,
+        &["soup", "attributes", "bins", "leftout", "added", "hits", "flips", "even", "signs"],
+    ),
     (Stage::Contour, &["attributes", "hits", "flips", "signs", "cells", "output"]),
     (Stage::Verify, &["attributes", "cells", "output"]),
 ];

@@ -180,10 +180,10 @@ impl DiskModel<'_> {
                 + bins
                 + drops
                 + self.edge_sorts(pairs).max(self.fins(pairs, drops))) as u64,
-            mend: (kept + bins + 2.0 * drops + added + self.mending(pairs, drops)) as u64,
-            scan: (kept + bins + drops + added + hits) as u64,
-            patch: (kept + bins + drops + added + hits + faces + 2.0 * flips) as u64,
-            flood: (kept + bins + drops + added + hits + flips + regions) as u64,
+            mend: (kept + soup + bins + 2.0 * drops + added + self.mending(pairs, drops)) as u64,
+            scan: (kept + soup + bins + drops + added + hits) as u64,
+            patch: (kept + soup + bins + drops + added + hits + faces + 2.0 * flips) as u64,
+            flood: (kept + soup + bins + drops + added + hits + flips + regions) as u64,
             relabel: (kept + hits + flips + regions + signs) as u64,
             choose: (kept + hits + flips + signs + cells + 2.0 * surface) as u64,
             place: (kept + hits + flips + signs + cells) as u64,
