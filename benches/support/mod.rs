@@ -102,8 +102,9 @@ impl Workshop {
         flips: &Flips,
     ) -> (BrickFile, SignStats) {
         let resources = self.resources();
-        let flooded = flood(hits, flips, &model.domain, &resources).expect("sign works");
-        assign_signs(hits, flips, &flooded, FillRule::Solid, &resources).expect("sign works")
+        let rule = FillRule::Solid;
+        let (flooded, _) = flood(hits, flips, rule, &model.domain, &resources).expect("sign works");
+        assign_signs(hits, flips, &flooded, rule, &resources).expect("sign works")
     }
 
     pub fn place(

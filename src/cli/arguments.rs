@@ -82,6 +82,9 @@ pub struct ResourceArguments {
 enum FillRuleName {
     /// All that the outside cannot reach: unites overlaps, fills cavities.
     Solid,
+    /// Winding number by the orientation of triangles, most votes count: keeps cavities, unites
+    /// overlaps.
+    Nonzero,
     /// Parity of the walls crossed: keeps cavities, hollows overlaps.
     Evenodd,
 }
@@ -139,6 +142,7 @@ impl ResultArguments {
         };
         let fill_rule = match self.fill_rule {
             FillRuleName::Solid => FillRule::Solid,
+            FillRuleName::Nonzero => FillRule::Nonzero,
             FillRuleName::Evenodd => FillRule::Evenodd,
         };
         let sheets = match self.sheets {

@@ -83,6 +83,7 @@ pub fn conclude(
         thickened: findings.thickened,
         scan: findings.scan,
         patch: findings.patch.clone(),
+        votes: findings.votes,
         sign: findings.sign,
         stages: BTreeMap::new(),
         counters: Counter::ALL.map(|c| (c, run.recording.total(c))).into_iter().collect(),

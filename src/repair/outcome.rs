@@ -13,7 +13,7 @@ use crate::octree::{Domain, SnapBox};
 use crate::patch::{Opening, PatchStats};
 use crate::repair::settings::Settings;
 use crate::scan::ScanStats;
-use crate::sign::SignStats;
+use crate::sign::{SignStats, VoteStats};
 use crate::verify::Proof;
 
 /// Version of this schema.
@@ -188,6 +188,8 @@ pub struct Outcome {
     pub scan: ScanStats,
     /// See `scan`.
     pub patch: PatchStats,
+    /// Votes on winding numbers, with the fill rule `nonzero`.
+    pub votes: VoteStats,
     /// See `scan`.
     pub sign: SignStats,
     /// Seconds per stage.

@@ -28,7 +28,7 @@ use crate::repair::settings::{Depth, MaxHole, ThinRule};
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
-use crate::sign::{FillRule, Flooded, SIGNS, SignStats, assign_signs, find_lost, flood};
+use crate::sign::{FillRule, Flooded, SIGNS, SignStats, VoteStats, assign_signs, find_lost, flood};
 use crate::store::{BrickFile, FileState, NoCheckpoints, Resources, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
 
@@ -60,6 +60,7 @@ pub struct Findings {
     pub deeper: Option<Domain>,
     pub scan: ScanStats,
     pub patch: PatchStats,
+    pub votes: VoteStats,
     pub sign: SignStats,
     /// The threshold, cells, where it was raised for fewer triangles.
     raised_cells: Option<f64>,
@@ -133,7 +134,9 @@ impl Run<'_> {
             Step::Mend => self.mend(workspace, findings, resources)?,
             Step::Scan => scan_bins(workspace, findings, handles, resources)?,
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
-            Step::Flood => flood_bricks(workspace, findings, handles, resources)?,
+            Step::Flood => {
+                flood_bricks(self.settings.fill_rule, workspace, findings, handles, resources)?
+            }
             Step::Thicken => self.thicken(workspace, findings, handles, resources)?,
             Step::Sign => self.sign(workspace, findings, handles, resources)?,
             Step::Choose => self.choose(workspace, findings, handles, resources)?,
@@ -290,7 +293,10 @@ impl Run<'_> {
         let (flips, stats) =
             patch(&hits, HAS_ODD_FACES, cell_units, resources).map_err(RepairError::Patch)?;
         findings.patch = stats;
-        let flooded = flood(&hits, &flips, &domain, resources).map_err(RepairError::Sign)?;
+        let rule = self.settings.fill_rule;
+        let (flooded, votes) =
+            flood(&hits, &flips, rule, &domain, resources).map_err(RepairError::Sign)?;
+        findings.votes = votes;
         let mut files = hand_on(hits, &mut handles.hits);
         files.push(flips.state().clone());
         files.extend(flooded.files());
@@ -495,7 +501,7 @@ impl Run<'_> {
         let mut open = || crate::io::open(workspace.part(), resources.scratch, &options);
         let outward = match self.settings.fill_rule {
             FillRule::Solid => Outward::AllPositive,
-            FillRule::Evenodd => Outward::AlternatesWithNesting,
+            FillRule::Nonzero | FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
         let proof_options =
             ProofOptions { share_bytes: resources.share_bytes / 2, outward, intersections: true };
@@ -550,13 +556,16 @@ fn patch_bricks(
 }
 
 fn flood_bricks(
+    rule: FillRule,
     workspace: &Workspace,
-    findings: &Findings,
+    findings: &mut Findings,
     handles: &mut Handles,
     resources: &Resources,
 ) -> Result<Vec<FileState>, RepairError> {
     let flips = Flips::open(resources, &workspace.files())?;
     let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
-    let flooded = flood(hits, &flips, findings.domain(), resources).map_err(RepairError::Sign)?;
+    let (flooded, votes) =
+        flood(hits, &flips, rule, findings.domain(), resources).map_err(RepairError::Sign)?;
+    findings.votes = votes;
     Ok(flooded.files())
 }

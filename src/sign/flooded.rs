@@ -32,6 +32,11 @@ pub const OUTSIDE: u8 = 1;
 /// In a record of a region: only walls closer than a cell keep the outside away.
 pub const SEALED_BY_RESOLUTION: u8 = 2;
 
+/// In a record of a region: the winding number is not zero.
+pub const WOUND: u8 = 4;
+/// In a record of a region: no votes tell its winding number.
+pub const UNTOLD: u8 = 8;
+
 /// What the outside reaches.
 pub struct Flooded {
     bricks: Spool<FloodedBrick>,
@@ -58,7 +63,8 @@ impl Flooded {
                 let outside = exterior.reaches(region)?;
                 let sealed = !outside && exterior.reaches_past_even(region)?;
                 let bits = if outside { OUTSIDE } else { 0 };
-                regions.push(bits | if sealed { SEALED_BY_RESOLUTION } else { 0 })?;
+                let bits = bits | if sealed { SEALED_BY_RESOLUTION } else { 0 };
+                regions.push(bits | exterior.winding_bits(region, outside)?)?;
             }
         }
         Ok(Self { bricks: records.finish()?, regions: regions.finish()? })

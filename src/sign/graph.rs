@@ -3,14 +3,19 @@
 //! A region is a set of corners joined by edges that no hit and no patch crosses. A second union,
 //! in which even hits do not count, tells which volumes only the resolution seals.
 
+use std::collections::BTreeMap;
+
 use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::{Gauge, Monitor, Resident};
 use crate::octree::{
-    BrickIndex, BrickKey, FaceRegions, Flips, Neighbour, Regions, edge_position, find_regions,
+    ArchivedHitBrick, BrickIndex, BrickKey, FaceRegions, FlipRecord, Flips, HitEdge, Neighbour,
+    Regions, SIDE, decode_hits, edge_position, find_regions,
 };
-use crate::sign::SignError;
+use crate::sign::flooded::{UNTOLD, WOUND};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
+use crate::sign::winding::{VoteStats, Votes, Windings};
+use crate::sign::{FillRule, SignError};
 use crate::store::{
     BrickFile, Labels, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite,
     ordered_by_weight,
@@ -59,6 +64,8 @@ pub struct RegionGraph {
     pieces: Sorter<FacePiece>,
     /// Pairs of regions joined by an edge with even hits.
     even: Option<Spool<[u32; 2]>>,
+    /// What hits say about winding numbers, where that is asked.
+    votes: Option<Sorter<Votes>>,
     regions: u64,
 }
 
@@ -68,9 +75,31 @@ pub struct Exterior {
     strict_outside: u32,
     loose: Labels,
     loose_outside: u32,
+    windings: Option<Windings>,
 }
 
 impl Exterior {
+    /// What the votes came to.
+    pub fn vote_stats(&self) -> VoteStats {
+        self.windings.as_ref().map_or_else(VoteStats::default, |windings| windings.stats)
+    }
+
+    /// What the winding number of a region says in its record.
+    pub fn winding_bits(&mut self, region: u32, is_outside: bool) -> Result<u8, StoreError> {
+        let Some(windings) = &mut self.windings else { return Ok(0) };
+        if is_outside {
+            return Ok(0);
+        }
+        if windings.stats.fell_back {
+            return Ok(WOUND);
+        }
+        Ok(match windings.of(self.strict.label(region)?)? {
+            Some(0) => 0,
+            Some(_) => WOUND,
+            None => UNTOLD,
+        })
+    }
+
     /// Reached past no hit at all.
     pub fn reaches(&mut self, region: u32) -> Result<bool, StoreError> {
         Ok(self.strict.label(region)? == self.strict_outside)
@@ -89,18 +118,22 @@ struct BrickSays {
     odd_first_line: bool,
     sides: [FaceRegions; 6],
     even: Vec<[u16; 2]>,
+    /// Regions at the lower and the upper end of edges, the change, and how many edges say so.
+    votes: Vec<([u16; 2], i16, u32)>,
 }
 
 /// Finds the regions of all bricks.
 pub fn build_graph(
     hits: &BrickFile,
     flips: &Flips,
+    rule: FillRule,
     resources: &Resources,
 ) -> Result<RegionGraph, SignError> {
     let mut items = LoadItems::new(hits, flips, resources);
     let mut bricks = Vec::with_capacity(hits.len());
     let mut pieces = Sorter::<FacePiece>::new(resources.scratch, resources.share_bytes / 4);
     let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, "even.spool")?;
+    let mut votes = Sorter::<Votes>::new(resources.scratch, resources.share_bytes / 8);
     let mut regions = 0_u64;
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
     ordered_by_weight(
@@ -110,8 +143,12 @@ pub fn build_graph(
         Loaded::default,
         |loaded, item| {
             let _brick = resident.hold(1);
-            loaded.load(hits, &item)?;
-            Ok(examine(loaded, item.brick))
+            let view = loaded.load(hits, &item)?;
+            let mut says = examine(loaded, item.brick);
+            if let (FillRule::Nonzero, Some(view)) = (rule, view) {
+                says.votes = votes_of(decode_hits(&view)?, loaded, &item.flips);
+            }
+            Ok(says)
         },
         |says: BrickSays| {
             let base = u32::try_from(regions + u64::from(says.regions))
@@ -119,6 +156,10 @@ pub fn build_graph(
                 - u32::from(says.regions);
             for pair in &says.even {
                 even.push(pair.map(|region| base + u32::from(region)))?;
+            }
+            for &(regions, delta, count) in &says.votes {
+                let [a, b] = regions.map(|region| base + u32::from(region));
+                votes.push(Votes { a, b, delta: delta.into(), count })?;
             }
             push_sides(&says, base, &mut pieces)?;
             bricks.push(GraphBrick {
@@ -133,7 +174,8 @@ pub fn build_graph(
         },
     )?;
     let even = Some(even.finish()?);
-    Ok(RegionGraph { bricks, pieces, even, regions })
+    let votes = (rule == FillRule::Nonzero).then_some(votes);
+    Ok(RegionGraph { bricks, pieces, even, votes, regions })
 }
 
 fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
@@ -146,7 +188,36 @@ fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
         odd_first_line: loaded.marks.rows(0)[0].count_ones() % 2 == 1,
         sides,
         even: even_pairs(loaded, &regions),
+        votes: Vec::new(),
     }
+}
+
+/// What the hits of a brick say about the winding numbers of its regions. An edge that a patch
+/// crosses says nothing.
+fn votes_of(
+    brick: &ArchivedHitBrick,
+    loaded: &Loaded,
+    flips: &[FlipRecord],
+) -> Vec<([u16; 2], i16, u32)> {
+    let regions = find_regions(&loaded.barrier);
+    let mut flips = flips.iter().peekable();
+    let mut votes: BTreeMap<([u16; 2], i16), u32> = BTreeMap::new();
+    for edge in brick.edges.iter() {
+        let signed_sum = edge.signed_sum.to_native();
+        let edge = HitEdge { bits: edge.bits.to_native(), signed_sum };
+        while flips.next_if(|flip| flip.edge < edge.edge()).is_some() {}
+        let is_patched = flips.peek().is_some_and(|flip| flip.edge == edge.edge());
+        let (axis, at) = edge_position(edge.edge());
+        if is_patched || at.iter().any(|&c| c == SIDE) {
+            continue;
+        }
+        let mut beyond = at;
+        beyond[axis] += 1;
+        let ends = [regions.at(at), regions.at(beyond)];
+        // A triangle that faces up the axis has the inside below it.
+        *votes.entry((ends, -signed_sum)).or_default() += 1;
+    }
+    votes.into_iter().map(|((ends, delta), count)| (ends, delta, count)).collect()
 }
 
 /// Pairs of regions on both sides of an edge that is a barrier and not marked.
@@ -222,8 +293,31 @@ impl RegionGraph {
         let (mut strict, mut loose) = (strict.finish()?, loose.finish()?);
         let strict_outside = strict.label(outside)?;
         let loose_outside = loose.label(outside)?;
-        Ok(Exterior { strict, strict_outside, loose, loose_outside })
+        let windings = match self.votes.take() {
+            Some(votes) => {
+                let votes = relabelled(votes, &mut strict, resources)?;
+                let regions = u64::from(outside) + 1;
+                Some(Windings::count(votes, regions, strict_outside, resources)?)
+            }
+            None => None,
+        };
+        Ok(Exterior { strict, strict_outside, loose, loose_outside, windings })
     }
+}
+
+/// The votes between what regions of all bricks were united to.
+fn relabelled(
+    votes: Sorter<Votes>,
+    labels: &mut Labels,
+    resources: &Resources,
+) -> Result<Sorter<Votes>, StoreError> {
+    let mut between = Sorter::new(resources.scratch, resources.share_bytes / 8);
+    let mut sorted = votes.finish()?;
+    while let Some(Votes { a, b, delta, count }) = sorted.next()? {
+        let (a, b) = (labels.label(a)?, labels.label(b)?);
+        between.push(Votes { a, b, delta, count }.ordered())?;
+    }
+    Ok(between)
 }
 
 /// Joins what the two sides of every face say, or one side and the empty space beyond.

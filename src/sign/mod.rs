@@ -17,6 +17,7 @@ mod parity;
 mod relabel;
 mod thin;
 mod tips;
+mod winding;
 
 use serde::{Deserialize, Serialize};
 
@@ -29,6 +30,7 @@ use crate::store::{BrickFile, Resources, StoreError};
 
 pub use flooded::{FLOODED, Flooded, FloodedBrick, REGIONS};
 pub use thin::find_lost;
+pub use winding::VoteStats;
 
 /// Name of the brick file that sign generation leaves.
 pub const SIGNS: &str = "signs.bricks";
@@ -60,6 +62,8 @@ pub enum FillRule {
     /// All that the exterior cannot reach past any hit.
     #[default]
     Solid,
+    /// Where the winding number is not zero, by the votes of triangles; keeps cavities.
+    Nonzero,
     /// Ju's parity: inside after an odd number of walls.
     Evenodd,
 }
@@ -114,22 +118,28 @@ impl SignError {
     }
 }
 
-/// Finds what the outside reaches.
+/// Finds what the outside reaches, and with [`FillRule::Nonzero`] the winding numbers.
 ///
 /// # Errors
 /// [`SignError`].
 pub fn flood(
     hits: &BrickFile,
     flips: &Flips,
+    rule: FillRule,
     domain: &Domain,
     resources: &Resources,
-) -> Result<Flooded, SignError> {
-    let mut graph = build_graph(hits, flips, resources)?;
+) -> Result<(Flooded, VoteStats), SignError> {
+    let mut graph = build_graph(hits, flips, rule, resources)?;
     let keys = graph.bricks.iter().map(|brick| brick.key).collect();
     let index = BrickIndex::new(keys, domain.bricks_per_side());
     let exterior = graph.flood(&index, resources)?;
     let parities = base_parities(&graph.bricks);
-    Flooded::write(&graph.bricks, &parities, exterior, resources)
+    let votes = exterior.vote_stats();
+    if votes.fell_back {
+        let note = "triangles contradict each other in where is inside: filled as solid";
+        resources.monitor.note(note);
+    }
+    Ok((Flooded::write(&graph.bricks, &parities, exterior, resources)?, votes))
 }
 
 /// Decides all signs.

@@ -6,7 +6,7 @@ use crate::octree::{
     PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_hits, edge_position, encode,
     find_regions,
 };
-use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION};
+use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::tips::take_off_tips;
 use crate::sign::{FillRule, SIGNS, SignError, SignStats};
@@ -116,17 +116,23 @@ impl Workspace {
         rule: FillRule,
     ) -> Result<(), SignError> {
         for row in 0..ROWS {
-            let (mut inside, mut sealed) = (0, 0);
+            let (mut inside, mut sealed, mut wound, mut untold) = (0, 0, 0, 0);
             for (bits, region) in regions.row(row) {
                 let known = item.regions[usize::from(region)];
                 inside |= if known & OUTSIDE != 0 { 0 } else { bits };
+                wound |= if known & WOUND != 0 { bits } else { 0 };
+                untold |= if known & UNTOLD != 0 { bits } else { 0 };
                 sealed |= if known & SEALED_BY_RESOLUTION != 0 { bits } else { 0 };
             }
             let parity = self.parity.rows[row];
             if parity & !inside != 0 {
                 return Err(contradiction(item, "parity inside to be out of the exterior's reach"));
             }
-            self.signs.rows[row] = if rule == FillRule::Solid { inside } else { parity };
+            self.signs.rows[row] = match rule {
+                FillRule::Solid => inside,
+                FillRule::Nonzero => wound | untold & parity,
+                FillRule::Evenodd => parity,
+            };
             self.sealed.rows[row] = sealed;
         }
         Ok(())

@@ -29,7 +29,7 @@ impl Surface {
         let scratch = Scratch::new(folder.path());
         let outward = match rule {
             FillRule::Solid => Outward::AllPositive,
-            FillRule::Evenodd => Outward::AlternatesWithNesting,
+            FillRule::Nonzero | FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
         let options = ProofOptions { share_bytes: 16 << 20, outward, intersections: true };
         let read = ReadOptions { share_bytes: 16 << 20 };
