@@ -195,3 +195,30 @@ fn walls_are_the_same_whatever_the_memory_and_the_threads() {
     });
     assert!(bytes.iter().all(|other| *other == bytes[0]));
 }
+
+#[test]
+fn cracks_wider_than_a_cell_are_joined_wherever_the_grid_lies() {
+    // The octants of a ball, pulled apart by a cell and a half.
+    let ball = sphere([0.0; 3], 1.0, 32);
+    let mut random = Random::new(14);
+    for pose in 0..4 {
+        let cell = 2.0 / 57.0;
+        let pulled: Vec<Corners> = ball
+            .iter()
+            .map(|corners| {
+                let middle = corners.iter().map(|c| DVec3::from(*c)).sum::<DVec3>();
+                let away = middle.signum() * 0.75 * cell;
+                corners.map(|corner| (DVec3::from(corner) + away).into())
+            })
+            .collect();
+        let (soup, scale) = posed(&pulled, pose, &mut random);
+        let (outcome, surface) = with_holes(&soup, MaxHole::Auto, 6);
+        let whole = surface.proof.volume / scale.powi(3) / volume(&ball);
+        assert!(whole > 0.97 && whole < 1.12, "pose {pose}: {whole}, {:?}", outcome.mend);
+        assert_eq!((outcome.mend.walled_shells, surface.proof.components), (0, 1));
+        assert!(outcome.mend.joined_length > 0.0);
+        let settings = Settings { max_gap: Reach::Cells(0.0), ..at_depth(6) };
+        let (apart, _) = repair_soup(&soup, &settings).expect("a result");
+        assert_eq!(apart.mend.joined_length, 0.0);
+    }
+}

@@ -40,8 +40,8 @@ const LYING_CELLS: f64 = 0.5;
 /// No more sheets than this are told of one sample.
 const MOST_SHEETS: usize = 4;
 
-/// A sample that is covered. 12 bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
+/// A sample that is covered. 16 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct Contact {
     /// Number of the rim edge, and of the sample on it.
@@ -50,6 +50,8 @@ pub struct Contact {
     /// Number of the sheet whose rim covers it; [`ON_FACE`] where it ends on a face, [`LYING`] where
     /// it lies on one.
     pub sheet: u32,
+    /// How far the rim that covers it is, in cells; 0 for faces.
+    pub apart: f32,
 }
 
 /// In [`Contact::sheet`]: the rim ends on a face.
@@ -97,17 +99,20 @@ pub fn find_contacts(
         |outbox, near: Near| {
             let lying = LYING_CELLS * domain.cell_size();
             let grid = SampleGrid::new(&near.samples, options.max_gap, lying);
+            let cell = domain.cell_size();
             for (sample, found) in near.samples.iter().zip(grid.facing_rims()) {
-                let mut tell =
-                    |sheet| outbox.push(Contact { rim: sample.rim, index: sample.index, sheet });
-                found.iter().try_for_each(|&sheet| tell(sheet))?;
+                let (rim, index) = (sample.rim, sample.index);
+                for (sheet, apart) in found {
+                    let apart = (apart / cell) as f32;
+                    outbox.push(Contact { rim, index, sheet, apart })?;
+                }
             }
             near.bin.each(soup, |triangle| {
                 for (sample, ends) in grid.samples_near(triangle) {
                     if ends != Ends::Beside && covers(&sheets, triangle.source, sample, ends)? {
                         let (rim, index) = (sample.rim, sample.index);
                         let sheet = if ends == Ends::Lying { LYING } else { ON_FACE };
-                        outbox.push(Contact { rim, index, sheet })?;
+                        outbox.push(Contact { rim, index, sheet, apart: 0.0 })?;
                     }
                 }
                 Ok(())
@@ -192,7 +197,7 @@ impl NearBricks<'_> {
         samples.iter().try_for_each(|sample| {
             let (rim, index) = (sample.rim, sample.index);
             // As if a rim of its own sheet faced it.
-            self.crowd.push(Contact { rim, index, sheet: sample.sheet })
+            self.crowd.push(Contact { rim, index, sheet: sample.sheet, apart: 0.0 })
         })
     }
 }
@@ -224,19 +229,19 @@ impl<'s> SampleGrid<'s> {
             .map(move |entry| &samples[entry.1 as usize])
     }
 
-    /// Of each sample the sheets whose rims face it.
-    fn facing_rims(&self) -> impl Iterator<Item = Vec<u32>> {
+    /// Of each sample the sheets whose rims face it, and how far the nearest of each is.
+    fn facing_rims(&self) -> impl Iterator<Item = Vec<(u32, f64)>> {
         self.samples.iter().map(|sample| {
             let home = sample.at.map(|c| (c / self.reach).floor() as i64);
-            let mut found: Vec<u32> = Vec::new();
+            let mut found: Vec<(u32, f64)> = Vec::new();
             for at in 0..27 {
                 let cube = [0, 1, 2].map(|a| home[a] + at / 3_i64.pow(a as u32) % 3 - 1);
-                for other in self.in_cube(cube) {
-                    if found.len() < MOST_SHEETS
-                        && !found.contains(&other.sheet)
-                        && faces(sample, other, self.reach)
-                    {
-                        found.push(other.sheet);
+                for other in self.in_cube(cube).filter(|other| faces(sample, other, self.reach)) {
+                    let apart = sample.place().distance(other.place());
+                    match found.iter().position(|(sheet, _)| *sheet == other.sheet) {
+                        Some(known) => found[known].1 = found[known].1.min(apart),
+                        None if found.len() < MOST_SHEETS => found.push((other.sheet, apart)),
+                        None => {}
                     }
                 }
             }

@@ -21,6 +21,7 @@
 //!             gaps in the boundary of a polyhedron.
 
 mod contacts;
+mod cracks;
 pub mod fill;
 mod loops;
 mod miters;
@@ -106,6 +107,8 @@ pub struct MendStats {
     pub walled_area: f64,
     /// Triangles of walls and fills; their source numbers follow upon those of the input.
     pub added_triangles: u64,
+    /// Length of the rims that strips were put between, both sides.
+    pub joined_length: f64,
     /// Openings that were filled.
     pub filled_holes: u64,
     /// Of these, those that go on smoothly as the surface around does.

@@ -11,9 +11,10 @@
 
 use glam::DVec3;
 
+use crate::bridge::cracks::{Strips, join_cracks};
 use crate::bridge::fill::{FillKind, FillOptions, RimLoop, fill_loop};
 use crate::bridge::loops::{MOST_RIMS, Opening, ShellRim, trace};
-use crate::bridge::rims::{RimEdge, TURNED};
+use crate::bridge::rims::{NEW, RimEdge, TURNED};
 use crate::bridge::shells::{Cover, RimOfShell, Shells};
 use crate::bridge::{Added, FilledHole, HoleRule, MendOptions, MendStats};
 use crate::octree::points::pack_point;
@@ -116,11 +117,23 @@ struct Decision<'d> {
 impl Decision<'_> {
     fn make(&mut self, shells: &mut Shells, added: &mut Added) -> Result<(), StoreError> {
         let open_length: f64 = self.rims.iter().map(ShellRim::open_length).sum();
-        let least = LEAST_OPEN_CELLS * shells.domain.cell_size();
-        if open_length < least.max(2.0 * self.options.max_gap) {
-            return Ok(());
+        let least = (LEAST_OPEN_CELLS * self.cell).max(2.0 * self.options.max_gap);
+        if open_length >= least {
+            self.stats.open_shells += 1;
+            if self.wall(shells)? {
+                return Ok(());
+            }
         }
-        self.stats.open_shells += 1;
+        // What is wanted stayed open above, so all that is left may be closed.
+        match join_cracks(self.rims, self.options.max_gap, shells.domain) {
+            Some(strips) => self.close_cracks(&strips, added),
+            None if open_length >= least => self.close_all(added),
+            None => Ok(()),
+        }
+    }
+
+    /// Makes a wall of the shell if one of its openings is wanted.
+    fn wall(&mut self, shells: &mut Shells) -> Result<bool, StoreError> {
         let mut sheets: Vec<u32> = self.rims.iter().map(|rim| rim.edge.sheet).collect();
         sheets.sort_unstable();
         sheets.dedup();
@@ -128,15 +141,32 @@ impl Decision<'_> {
         let openings = trace(self.rims);
         let wanted: Vec<&Opening> =
             openings.iter().filter(|opening| self.is_wanted(opening, shell.area)).collect();
-        if !wanted.is_empty() || self.is_held_panel(&sheets, shell.area) {
-            self.stats.walled_shells += 1;
-            self.stats.walled_triangles += shell.triangles;
-            self.stats.walled_area += shell.area;
-            self.stats.wanted_openings += wanted.len() as u64;
-            let is_free = wanted.iter().all(|opening| opening.held(self.rims)[0] < 0.5);
-            return shells.wall(&sheets, is_free);
+        if wanted.is_empty() && !self.is_held_panel(&sheets, shell.area) {
+            return Ok(false);
         }
-        openings.iter().try_for_each(|opening| self.close(opening, added))
+        self.stats.walled_shells += 1;
+        self.stats.walled_triangles += shell.triangles;
+        self.stats.walled_area += shell.area;
+        self.stats.wanted_openings += wanted.len() as u64;
+        let is_free = wanted.iter().all(|opening| opening.held(self.rims)[0] < 0.5);
+        shells.wall(&sheets, is_free)?;
+        Ok(true)
+    }
+
+    /// Puts strips into cracks, and closes what they leave.
+    fn close_cracks(&mut self, strips: &Strips, added: &mut Added) -> Result<(), StoreError> {
+        self.stats.joined_length += strips.length;
+        let like = (self.rims[0].edge.part, self.rims[0].edge.material);
+        for triangle in &strips.triangles {
+            added.push(triangle.map(|corner| corner.to_array()), like)?;
+        }
+        let Self { options, cell, room, .. } = *self;
+        let rims = &strips.rims;
+        Decision { rims, options, stats: &mut *self.stats, cell, room }.close_all(added)
+    }
+
+    fn close_all(&mut self, added: &mut Added) -> Result<(), StoreError> {
+        trace(self.rims).iter().try_for_each(|opening| self.close(opening, added))
     }
 
     fn is_wanted(&self, opening: &Opening, area: f64) -> bool {
@@ -195,13 +225,17 @@ impl Decision<'_> {
             let corners = if is_turned { [p, q, r] } else { [q, p, r] };
             added.push(corners.map(|p| p.to_array()), (edge.part, edge.material))?;
         }
-        self.tell(&rim.points, area, fill.kind);
+        // What is left between strips is no hole.
+        if opening.steps.iter().all(|step| self.rims[step.rim].edge.flags & NEW == 0) {
+            self.tell(&rim.points, area, fill.kind);
+        }
         Ok(())
     }
 
     /// The third corners of the triangles along an opening.
     fn opposite(&self, opening: &Opening) -> Vec<Option<DVec3>> {
-        opening.steps.iter().map(|step| Some(self.rims[step.rim].edge.opposite())).collect()
+        let edges = opening.steps.iter().map(|step| &self.rims[step.rim].edge);
+        edges.map(|edge| (edge.flags & NEW == 0).then(|| edge.opposite())).collect()
     }
 
     /// Length of an opening that no rim faces.

@@ -29,7 +29,7 @@ pub struct RimEdge {
     pub part: u32,
     /// Of the triangle.
     pub material: u32,
-    /// [`HELD`], [`TURNED`].
+    /// [`HELD`], [`TURNED`], [`NEW`].
     pub flags: u32,
     /// Zero.
     pub unused: u32,
@@ -37,6 +37,8 @@ pub struct RimEdge {
 
 /// Other sheets go on across the edge.
 pub const HELD: u32 = 1;
+/// The edge is one of a strip, whose triangles tell nothing about the surface.
+pub const NEW: u32 = 4;
 /// The triangle is turned over against the first one of its sheet.
 pub const TURNED: u32 = 2;
 

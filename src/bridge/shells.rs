@@ -59,12 +59,14 @@ impl Measure {
     }
 }
 
-/// Shares of a rim edge, 0 to 1. 24 bytes.
+/// Shares of a rim edge, 0 to 1. 32 bytes.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Cover {
     /// Other rims face it.
     pub faced: f64,
+    /// The nearest of them is farther than a cell: a crack that the scan would see.
+    pub wide: f64,
     /// It ends on a face.
     pub on_face: f64,
     /// It lies on a face.
@@ -136,22 +138,30 @@ impl<'d> Shells<'d> {
                 let all = f64::from(samples_of(rim.length(), domain.cell_size()));
                 let mut cover = Cover::default();
                 let mut last = None;
+                let mut nearest = f32::INFINITY;
                 while let Some(contact) = next
                     && contact.rim == number
                 {
                     // Of one sample those of rims come first, then the face that it lies on.
-                    let share = if last == Some(contact.index) { 0.0 } else { 1.0 / all };
+                    let is_next = last != Some(contact.index);
+                    if is_next {
+                        cover.wide += wide_share(nearest, all);
+                        nearest = f32::INFINITY;
+                    }
+                    let share = if is_next { 1.0 / all } else { 0.0 };
                     last = Some(contact.index);
                     match contact.sheet {
                         ON_FACE => cover.on_face += share,
                         LYING => cover.lying += share,
                         sheet => {
                             cover.faced += share;
+                            nearest = nearest.min(contact.apart);
                             unite.unite(rim.sheet, sheet)?;
                         }
                     }
                     next = contacts.next()?;
                 }
+                cover.wide += wide_share(nearest, all);
                 if rim.flags & HELD != 0 {
                     cover.on_face = 1.0;
                 }
@@ -248,6 +258,15 @@ impl<'d> Shells<'d> {
     pub fn fate(&mut self, sheet: u32) -> Result<Fate, StoreError> {
         Ok(Fate::ALL[self.measures.get(sheet.into())?.fate as usize])
     }
+}
+
+/// Samples farther apart than this belong to a crack wider than a cell: they are up to a cell apart
+/// along it.
+const WIDE_CELLS: f32 = 1.25;
+
+/// The share of one sample, if the nearest rim that faces it is across a wide crack.
+fn wide_share(nearest: f32, samples: f64) -> f64 {
+    if nearest > WIDE_CELLS && nearest.is_finite() { 1.0 / samples } else { 0.0 }
 }
 
 /// Whether a brick holds the lowest corner of a triangle: one of the bricks that have it does.
