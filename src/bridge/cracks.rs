@@ -21,6 +21,10 @@ use crate::octree::points::pack_point;
 /// Less length of wide cracks than this is left to the patch.
 const LEAST_CELLS: f64 = 4.0;
 
+/// A shell has cracks where this share of its rims faces others across wide ones. Where less does,
+/// rims that pass each other by chance are more likely.
+const PULLED_SHARE: f64 = 0.5;
+
 /// Pieces of half a gap beyond which the cracks of a shell are left to the patch.
 const MOST_PIECES: f64 = 200_000.0;
 
@@ -37,7 +41,11 @@ pub struct Strips {
 pub fn join_cracks(rims: &[ShellRim], max_gap: f64, domain: &Domain) -> Option<Strips> {
     let wide: f64 = rims.iter().map(|rim| rim.edge.length() * rim.cover.wide).sum();
     let length: f64 = rims.iter().map(|rim| rim.edge.length()).sum();
-    if wide < LEAST_CELLS * domain.cell_size() || length / max_gap > MOST_PIECES {
+    let is_pulled_apart = wide >= PULLED_SHARE * length;
+    if wide < LEAST_CELLS * domain.cell_size() || !is_pulled_apart {
+        return None;
+    }
+    if length / max_gap > MOST_PIECES {
         return None;
     }
     let mut left = BTreeMap::new();

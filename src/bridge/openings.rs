@@ -39,6 +39,9 @@ const LEAST_OPEN_CELLS: f64 = 4.0;
 /// Cells at the border of the grid that fills keep free.
 const FREE_CELLS: i64 = 2;
 
+/// Fills are not refined below so many cells where they lie between strips.
+const COARSE_CELLS: f64 = 1000.0;
+
 /// Holes that are told of one by one.
 const MOST_TOLD: usize = 16;
 
@@ -208,7 +211,10 @@ impl Decision<'_> {
             return Ok(());
         }
         let rim = RimLoop { points: opening.points(self.rims), opposite: self.opposite(opening) };
-        let options = FillOptions { cell: self.cell, crease_deg: self.options.crease_deg };
+        // What is left between strips is as small as they are: it needs no finer triangles.
+        let is_new = opening.steps.iter().any(|step| self.rims[step.rim].edge.flags & NEW != 0);
+        let cell = if is_new { COARSE_CELLS * self.cell } else { self.cell };
+        let options = FillOptions { cell, crease_deg: self.options.crease_deg };
         let Some(fill) = fill_loop(&rim, &options) else {
             self.stats.patched_length += self.length(opening);
             return Ok(());
@@ -226,7 +232,7 @@ impl Decision<'_> {
             added.push(corners.map(|p| p.to_array()), (edge.part, edge.material))?;
         }
         // What is left between strips is no hole.
-        if opening.steps.iter().all(|step| self.rims[step.rim].edge.flags & NEW == 0) {
+        if !is_new {
             self.tell(&rim.points, area, fill.kind);
         }
         Ok(())

@@ -208,7 +208,7 @@ fn votes_of(
         while flips.next_if(|flip| flip.edge < edge.edge()).is_some() {}
         let is_patched = flips.peek().is_some_and(|flip| flip.edge == edge.edge());
         let (axis, at) = edge_position(edge.edge());
-        if is_patched || at.iter().any(|&c| c == SIDE) {
+        if is_patched || at.contains(&SIDE) {
             continue;
         }
         let mut beyond = at;

@@ -85,8 +85,8 @@ impl Estimate {
         let Some(before) = levels.checked_sub(1).filter(|before| *before > 0) else {
             return self.disk_bytes;
         };
-        let signs = self.disk.relabel - self.disk.flood + 1;
-        self.disk.peak().max(self.disk.prove + signs) + before * self.output_bytes
+        // The signs are no more than all that is there while they are made.
+        self.disk.peak().max(self.disk.prove + self.disk.relabel) + before * self.output_bytes
     }
 }
 
