@@ -81,7 +81,7 @@ fn open_sphere(centre: [f64; 3], radius: f64, top: f64) -> Vec<Corners> {
 
 #[test]
 fn the_place_in_the_grid_does_not_change_the_volume() {
-    let radius = 0.3;
+    let radius = 0.3_f64;
     let mut random = Random::new(31);
     for top in [1.1, 0.75] {
         // What is missing of the ball is filled as the ball goes on.
