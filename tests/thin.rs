@@ -108,3 +108,16 @@ fn the_grid_gets_deeper_by_itself_where_walls_are_thin_and_says_so() {
     let (outcome, _) = auto(&cuboid([0.0; 3], [1.0; 3]), 12);
     assert_eq!((outcome.grid.depth, outcome.thickened.triangles), (8, 0));
 }
+
+#[test]
+fn walls_within_a_solid_are_not_thickened() {
+    let mut random = Random::new(13);
+    for pose in 0..4 {
+        let mut soup = cuboid([0.0; 3], [1.0; 3]);
+        soup.extend(cuboid([0.002; 3], [0.998; 3]));
+        let soup = transform(&soup, rotation(&mut random), DVec3::ZERO);
+        let (outcome, surface) = repair_soup(&soup, &at_depth(7)).expect("a result");
+        assert_eq!(outcome.thickened.triangles, 0, "pose {pose}");
+        assert!((surface.proof.volume - 1.0).abs() < 1e-3, "pose {pose}");
+    }
+}

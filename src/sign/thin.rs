@@ -55,7 +55,7 @@ pub fn find_lost(
             let Some(view) = loaded.load(hits, &item)? else { return Ok(Vec::new()) };
             let regions = find_regions(&loaded.barrier);
             // A wall that is left as specks is lost as well.
-            let specks = find_specks(&regions);
+            let specks = find_specks(&regions, &known);
             let is_outside = |at| {
                 let region = usize::from(regions.at(at));
                 known[region] & OUTSIDE != 0 || specks[region]
@@ -67,9 +67,10 @@ pub fn find_lost(
     Ok(lost)
 }
 
-/// Which regions are specks: of few corners, all within the brick.
-fn find_specks(regions: &Regions) -> Vec<bool> {
-    let mut corners = vec![0; usize::from(regions.count)];
+/// Which regions are specks: of few corners, all within the brick, with nothing inside beside them.
+fn find_specks(regions: &Regions, known: &[u8]) -> Vec<bool> {
+    let is_outside = |region: u16| known[usize::from(region)] & OUTSIDE != 0;
+    let mut corners = vec![0; known.len()];
     for row in 0..ROWS {
         let is_border = [row % LINES, row / LINES].iter().any(|&c| c == 0 || c == SIDE);
         for (bits, region) in regions.row(row) {
@@ -78,7 +79,36 @@ fn find_specks(regions: &Regions) -> Vec<bool> {
             corners[usize::from(region)] += count;
         }
     }
-    corners.into_iter().map(|count| count <= SPECK_CORNERS).collect()
+    let mut specks: Vec<bool> = corners.into_iter().map(|count| count <= SPECK_CORNERS).collect();
+    for row in 0..ROWS {
+        for (bits, region) in regions.row(row).filter(|(_, region)| !is_outside(*region)) {
+            if !specks[usize::from(region)] {
+                continue;
+            }
+            let is_bare = (0..=SIDE).filter(|x| bits >> x & 1 == 1).all(|x| {
+                let at = [x, row % LINES, row / LINES];
+                neighbours(at).all(|beside| {
+                    let other = regions.at(beside);
+                    other == region || is_outside(other)
+                })
+            });
+            specks[usize::from(region)] = is_bare;
+        }
+    }
+    specks
+}
+
+/// The six corners beside one within the brick.
+fn neighbours(at: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
+    (0..6).map(move |side| {
+        let mut beside = at;
+        if side % 2 == 0 {
+            beside[side / 2] -= 1
+        } else {
+            beside[side / 2] += 1
+        }
+        beside
+    })
 }
 
 /// Whether the first and the last hit lie on planes that could be the sides of a wall. Those of a
