@@ -5,10 +5,10 @@ mod support;
 use brickmend::mesh::shapes::{
     Corners, Random, cuboid, rotation, shuffle, sphere, torus, transform, volume,
 };
-use brickmend::repair::{Limits, MaxHole, Outcome, Reach, Settings};
+use brickmend::repair::{MaxHole, Outcome, Reach, Settings};
 use glam::{DMat3, DVec3};
 
-use crate::support::run::{Encoding, Workshop, at_depth, repair_soup};
+use crate::support::run::{at_depth, repair_soup, same_whatever_the_limits};
 use crate::support::surface::Surface;
 
 /// A cube from 0 to 1 without the faces that look along these axes, up (1) or down (0).
@@ -179,21 +179,10 @@ fn holes_that_a_shape_is_meant_to_have_stay() {
 
 #[test]
 fn walls_are_the_same_whatever_the_memory_and_the_threads() {
-    let workshop = Workshop::new();
-    let input = workshop.write(&cube_without(&[(0, 0), (2, 1)]), Encoding::Obj);
-    let limits = [
-        Limits::default(),
-        Limits { share_bytes: Some(16 << 10), ..Limits::default() },
-        Limits { threads: 8, ..Limits::default() },
-    ];
-    let bytes = limits.map(|limits| {
-        let repaired = workshop.repair(&input, "ply", &at_depth(7), &limits).expect("a result");
-        assert_eq!(repaired.outcome.mend.walled_shells, 1);
-        let left = repaired.path.with_extension("ply.brickmend");
-        assert!(!left.exists(), "nothing is left of the work");
-        std::fs::read(repaired.path).expect("it is there")
+    let soup = cube_without(&[(0, 0), (2, 1)]);
+    same_whatever_the_limits(&soup, &at_depth(7), |outcome| {
+        assert_eq!(outcome.mend.walled_shells, 1);
     });
-    assert!(bytes.iter().all(|other| *other == bytes[0]));
 }
 
 #[test]

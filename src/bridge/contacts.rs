@@ -18,7 +18,7 @@ use crate::bridge::rims::RimEdge;
 use crate::bridge::samples::{RimSample, sample_rims};
 use crate::bridge::sheets::Sheets;
 use crate::geom::closest_on_triangle;
-use crate::octree::{BinnedSoup, Domain, SoupBin, SoupTriangle};
+use crate::octree::{BinWalk, BinnedSoup, Domain, SoupBin, SoupTriangle};
 use crate::store::{Outbox, Record, Resources, Sorted, Sorter, Spool, StoreError, ordered};
 
 /// More rim than this in one brick is no opening but a tangle.
@@ -72,7 +72,7 @@ struct Near {
     samples: Vec<RimSample>,
 }
 
-/// Finds all contacts.
+/// Finds all contacts, and how many samples count as covered since too many lie in one brick.
 pub fn find_contacts(
     soup: &BinnedSoup,
     rims: &Spool<RimEdge>,
@@ -80,12 +80,13 @@ pub fn find_contacts(
     options: &MendOptions,
     domain: &Domain,
     resources: &Resources,
-) -> Result<Sorter<Contact>, StoreError> {
+) -> Result<(Sorter<Contact>, u64), StoreError> {
     let samples = sample_rims(rims, options.max_gap, domain, resources)?;
     let contacts = Mutex::new(Sorter::new(resources.scratch, resources.share_bytes / 4));
     let mut samples = samples.finish()?;
     let next = samples.next()?;
-    let mut bricks = NearBricks { walk: soup.walk(), samples, next, crowd: Outbox::new(&contacts) };
+    let mut bricks =
+        NearBricks { walk: soup.walk(), samples, next, crowd: Outbox::new(&contacts), crowded: 0 };
     let sheets = Mutex::new(sheets);
     ordered(
         resources.pool,
@@ -121,7 +122,9 @@ pub fn find_contacts(
         },
         |()| Ok(()),
     )?;
-    Ok(contacts.into_inner().unwrap_or_else(PoisonError::into_inner))
+    let crowded = bricks.crowded;
+    drop(bricks);
+    Ok((contacts.into_inner().unwrap_or_else(PoisonError::into_inner), crowded))
 }
 
 /// How a rim ends near a face.
@@ -153,10 +156,11 @@ fn covers(
 
 /// Bricks with triangles and samples.
 struct NearBricks<'n> {
-    walk: crate::octree::BinWalk<'n>,
+    walk: BinWalk<'n>,
     samples: Sorted<RimSample>,
     next: Option<RimSample>,
     crowd: Outbox<'n, Contact>,
+    crowded: u64,
 }
 
 impl NearBricks<'_> {
@@ -194,6 +198,7 @@ impl NearBricks<'_> {
 
     /// Says of a crowd of samples that they are covered.
     fn cover(&mut self, samples: &[RimSample]) -> Result<(), StoreError> {
+        self.crowded += samples.len() as u64;
         samples.iter().try_for_each(|sample| {
             let (rim, index) = (sample.rim, sample.index);
             // As if a rim of its own sheet faced it.

@@ -37,16 +37,26 @@ pub struct Strips {
     pub length: f64,
 }
 
-/// Joins the rims of a shell; `None` where it has no wide cracks, or too much of them.
-pub fn join_cracks(rims: &[ShellRim], max_gap: f64, domain: &Domain) -> Option<Strips> {
+/// What becomes of the cracks of a shell.
+pub enum Cracks {
+    /// There are none that the scan would see.
+    Narrow,
+    /// So much length of wide ones, model units, is left to the patch.
+    TooLong(f64),
+    /// They are joined.
+    Joined(Strips),
+}
+
+/// Joins the rims of a shell.
+pub fn join_cracks(rims: &[ShellRim], max_gap: f64, domain: &Domain) -> Cracks {
     let wide: f64 = rims.iter().map(|rim| rim.edge.length() * rim.cover.wide).sum();
     let length: f64 = rims.iter().map(|rim| rim.edge.length()).sum();
     let is_pulled_apart = wide >= PULLED_SHARE * length;
     if wide < LEAST_CELLS * domain.cell_size() || !is_pulled_apart {
-        return None;
+        return Cracks::Narrow;
     }
     if length / max_gap > MOST_PIECES {
-        return None;
+        return Cracks::TooLong(wide);
     }
     let mut left = BTreeMap::new();
     for rim in rims.iter().filter(|rim| rim.edge.flags & HELD == 0) {
@@ -61,7 +71,9 @@ pub fn join_cracks(rims: &[ShellRim], max_gap: f64, domain: &Domain) -> Option<S
         })
         .collect();
     let strips = join_rims(&edges, max_gap);
-    let first = rims.first()?.edge;
+    let Some(ShellRim { edge: first, .. }) = rims.first().copied() else {
+        return Cracks::Narrow;
+    };
     for triangle in &strips.triangles {
         for i in 0..3 {
             let ends = [triangle[i], triangle[(i + 1) % 3]];
@@ -75,7 +87,7 @@ pub fn join_cracks(rims: &[ShellRim], max_gap: f64, domain: &Domain) -> Option<S
         }
     }
     let rims = left.into_values().map(|rim| ShellRim { cover: Cover::default(), ..rim }).collect();
-    Some(Strips { triangles: strips.triangles, rims, length: strips.length })
+    Cracks::Joined(Strips { triangles: strips.triangles, rims, length: strips.length })
 }
 
 /// Edges count mod 2.

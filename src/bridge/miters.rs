@@ -30,13 +30,14 @@ pub struct MiterUse {
     pub sheet: u32,
     pub source: u32,
     pub corner: u32,
-    pub unused: u32,
+    /// 1 where `sheet` is the triangle itself, since its sheet has one side only.
+    pub is_alone: u32,
 }
 
 impl Record for MiterUse {
-    type Key = ([u64; 2], u32, u32, u32);
+    type Key = ([u64; 2], u32, u32, u32, u32);
     fn key(&self) -> Self::Key {
-        (self.vertex, self.sheet, self.source, self.corner)
+        (self.vertex, self.is_alone, self.sheet, self.source, self.corner)
     }
 }
 
@@ -71,7 +72,7 @@ pub fn find_miters(
         let mut planes = Qef::default();
         around.clear();
         while let Some(one) = next
-            && (one.vertex, one.sheet) == (first.vertex, first.sheet)
+            && (one.vertex, one.is_alone, one.sheet) == (first.vertex, first.is_alone, first.sheet)
         {
             let normal = DVec3::from(one.normal);
             if normal != DVec3::ZERO {

@@ -117,8 +117,10 @@ pub struct MendStats {
     pub filled_area: f64,
     /// Openings that were left open since they are wanted.
     pub wanted_openings: u64,
-    /// Rim edges of shells with too many of them, left to the patch.
+    /// Rim edges of shells, or soups, with too many of them, left to the patch.
     pub crowded_rims: u64,
+    /// Places on rims, about one a cell, that lie with too many others in one brick to look at them.
+    pub crowded_samples: u64,
     /// Length of open rim that was left to the patch.
     pub patched_length: f64,
     /// The widest holes that were filled.
@@ -180,7 +182,8 @@ impl Mended {
     }
 }
 
-/// Mends a soup; `triangles` is the number of source numbers, `is_open` whether it has any rim.
+/// Mends a soup; `triangles` is the number of source numbers, `rim_edges` that of edges
+/// with an odd number of triangles.
 ///
 /// # Errors
 /// The scratch disk fails, or the caller cancels.
@@ -188,7 +191,7 @@ pub fn mend(
     soup: &BinnedSoup,
     options: &MendOptions,
     domain: &Domain,
-    (triangles, is_open): (u64, bool),
+    (triangles, rim_edges): (u64, u64),
     resources: &Resources,
 ) -> Result<(Mended, MendStats), StoreError> {
     let least_gap = LEAST_GAP_CELLS * domain.cell_size();
@@ -196,7 +199,9 @@ pub fn mend(
     let mut stats = MendStats::default();
     let mut added = Added::new(domain, triangles, resources);
     let mut drops = Sorter::<DropRecord>::new(resources.scratch, resources.share_bytes / 4);
-    if is_open && triangles <= sheets::MOST_TRIANGLES {
+    if triangles > sheets::MOST_TRIANGLES {
+        stats.crowded_rims = rim_edges;
+    } else if rim_edges > 0 {
         mend_open(soup, options, (&mut added, &mut drops), &mut stats, resources)?;
     }
     stats.added_triangles = added.next - triangles;
@@ -233,7 +238,8 @@ fn mend_open(
     if rims.is_empty() {
         return Ok(());
     }
-    let contacts = find_contacts(soup, &rims, &mut sheets, options, domain, resources)?;
+    let (contacts, crowded) = find_contacts(soup, &rims, &mut sheets, options, domain, resources)?;
+    stats.crowded_samples = crowded;
     let mut shells = Shells::new(&rims, contacts, &mut sheets, options, domain, resources)?;
     shells.measure(soup, &mut sheets)?;
     decide(&rims, &mut shells, options, added, stats, resources)?;

@@ -2,8 +2,8 @@
 //!
 //! An opening is wanted if its flat fill would add more than [`WANTED_SHARE`] to the area of its
 //! shell: a basket, a bowl, a lampshade, an open drawer, and every free panel, whose fill would be
-//! the panel itself. A shell with a wanted opening becomes walls. All other openings are filled,
-//! where their rims close by themselves.
+//! the panel itself. A shell with a wanted opening becomes walls. Else its wide cracks are joined
+//! and its openings are filled, where their rims close by themselves.
 //!
 //! In:         rims by shell, with what is covered of each.
 //! Out:        fates of sheets, and fills in the bins.
@@ -11,7 +11,7 @@
 
 use glam::DVec3;
 
-use crate::bridge::cracks::{Strips, join_cracks};
+use crate::bridge::cracks::{Cracks, Strips, join_cracks};
 use crate::bridge::fill::{FillKind, FillOptions, RimLoop, fill_loop};
 use crate::bridge::loops::{MOST_RIMS, Opening, ShellRim, trace};
 use crate::bridge::rims::{NEW, RimEdge, TURNED};
@@ -129,10 +129,11 @@ impl Decision<'_> {
         }
         // What is wanted stayed open above, so all that is left may be closed.
         match join_cracks(self.rims, self.options.max_gap, shells.domain) {
-            Some(strips) => self.close_cracks(&strips, added),
-            None if open_length >= least => self.close_all(added),
-            None => Ok(()),
+            Cracks::Joined(strips) => return self.close_cracks(&strips, added),
+            Cracks::TooLong(length) => self.stats.patched_length += length,
+            Cracks::Narrow => {}
         }
+        if open_length >= least { self.close_all(added) } else { Ok(()) }
     }
 
     /// Makes a wall of the shell if one of its openings is wanted.

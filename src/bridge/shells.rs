@@ -13,8 +13,8 @@ use crate::bridge::contacts::{Contact, LYING, ON_FACE};
 use crate::bridge::rims::{HELD, RimEdge};
 use crate::bridge::samples::samples_of;
 use crate::bridge::sheets::Sheets;
-use crate::octree::points::{owner, snapped};
-use crate::octree::{BinnedSoup, Domain, SoupTriangle};
+use crate::octree::points::is_owned;
+use crate::octree::{BinnedSoup, Domain};
 use crate::store::{Record, Resources, Sorter, Spool, StoreError, Table, Unite};
 
 /// What is known of a sheet, or of all sheets of a shell. 80 bytes.
@@ -267,10 +267,4 @@ const WIDE_CELLS: f32 = 1.25;
 /// The share of one sample, if the nearest rim that faces it is across a wide crack.
 fn wide_share(nearest: f32, samples: f64) -> f64 {
     if nearest > WIDE_CELLS && nearest.is_finite() { 1.0 / samples } else { 0.0 }
-}
-
-/// Whether a brick holds the lowest corner of a triangle: one of the bricks that have it does.
-pub fn is_owned(triangle: &SoupTriangle, domain: &Domain, brick: u64) -> bool {
-    let lowest = snapped(domain, triangle).into_iter().min().expect("three corners");
-    owner(domain, lowest) == brick
 }

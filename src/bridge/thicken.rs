@@ -18,9 +18,9 @@ use std::collections::BTreeMap;
 use glam::DVec3;
 
 use crate::bridge::sheets::{MOST_TRIANGLES, Sheets};
-use crate::bridge::shells::is_owned;
 use crate::bridge::walls::Slab;
 use crate::bridge::{Added, MendOptions};
+use crate::octree::points::is_owned;
 use crate::octree::{
     BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, SoupEdges, SoupTriangle,
     write_bins,
@@ -96,9 +96,8 @@ impl Hits {
     }
 }
 
-/// Thickens what loses hits; `given` is the number of source numbers of the input, `first` the first
-/// one that is free. `None`
-/// where there is nothing to thicken.
+/// Thickens what loses hits; `given` is the number of source numbers of the input, `first` the
+/// first one that is free. `None` where there is nothing to thicken.
 ///
 /// # Errors
 /// The scratch disk fails, or the caller cancels.
@@ -111,6 +110,7 @@ pub fn thicken(
     resources: &Resources,
 ) -> Result<Option<(Thickened, ThickenStats)>, StoreError> {
     if first > MOST_TRIANGLES {
+        resources.monitor.note("too many triangles to thicken those that are thin");
         return Ok(None);
     }
     let pairs = SoupEdges::find(soup, domain, resources)?.pairs;

@@ -12,9 +12,9 @@ use glam::DVec3;
 
 use crate::bridge::miters::{Miter, MiterUse, find_miters};
 use crate::bridge::sheets::Sheets;
-use crate::bridge::shells::{Fate, Shells, is_owned};
+use crate::bridge::shells::{Fate, Shells};
 use crate::bridge::{Added, MendOptions};
-use crate::octree::points::{pack_point, snapped};
+use crate::octree::points::{is_owned, pack_point, snapped};
 use crate::octree::{BinnedSoup, BorderUse, DropRecord, SnapBox, SoupTriangle};
 use crate::store::{Record, Resources, Sorted, Sorter, Spool, StoreError};
 
@@ -95,7 +95,8 @@ pub fn raise_walls(
                 let (source, corner) = (triangle.source, corner as u32);
                 // Where there is but one side, every triangle is a wall of its own.
                 let sheet = if side.is_one_sided { source } else { sheet };
-                uses.push(MiterUse { vertex, normal, sheet, source, corner, unused: 0 })?;
+                let is_alone = u32::from(side.is_one_sided);
+                uses.push(MiterUse { vertex, normal, sheet, source, corner, is_alone })?;
             }
             Ok(())
         })?;

@@ -25,6 +25,12 @@ pub(crate) fn owner(domain: &Domain, point: Point) -> u64 {
     BrickKey::new(point.map(|c| c / brick)).0
 }
 
+/// Whether a brick holds the lowest corner of a triangle: of all bricks that have it, one does.
+pub(crate) fn is_owned(triangle: &SoupTriangle, domain: &Domain, brick: u64) -> bool {
+    let lowest = snapped(domain, triangle).into_iter().min().expect("three corners");
+    owner(domain, lowest) == brick
+}
+
 /// The length of an edge in model units, for lattice units of `unit`.
 pub(crate) fn length_of(ends: [Point; 2], unit: f64) -> f64 {
     let square: f64 =

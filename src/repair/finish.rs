@@ -166,10 +166,10 @@ fn reasons(
             thickened * 100.0
         ));
     }
-    if findings.mend.crowded_rims > 0 {
+    if findings.mend.crowded_rims + findings.mend.crowded_samples > 0 {
         reasons.push(format!(
             "{} edges are open in places with too many of them to tell holes; the patch closed them",
-            findings.mend.crowded_rims
+            findings.mend.crowded_rims.max(findings.mend.crowded_samples)
         ));
     }
     if invented.filled_volume > FILLED_VOLUME_SHARE * proof.volume {

@@ -16,6 +16,7 @@ mod finish;
 mod length;
 mod levels;
 mod lock;
+mod mending;
 mod outcome;
 mod plan;
 mod run;

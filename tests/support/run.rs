@@ -69,6 +69,26 @@ pub fn repair_anything(soup: &[Corners], encoding: Encoding, rule: FillRule, dep
     }
 }
 
+/// Repairs a soup within all sorts of limits, looks at each outcome, and demands the same bytes and
+/// an empty work folder.
+pub fn same_whatever_the_limits(soup: &[Corners], settings: &Settings, look: impl Fn(&Outcome)) {
+    let workshop = Workshop::new();
+    let input = workshop.write(soup, Encoding::Obj);
+    let limits = [
+        Limits::default(),
+        Limits { share_bytes: Some(16 << 10), ..Limits::default() },
+        Limits { threads: 8, ..Limits::default() },
+    ];
+    let bytes = limits.map(|limits| {
+        let repaired = workshop.repair(&input, "ply", settings, &limits).expect("a result");
+        look(&repaired.outcome);
+        let left = repaired.path.with_extension("ply.brickmend");
+        assert!(!left.exists(), "nothing is left of the work");
+        std::fs::read(repaired.path).expect("it is there")
+    });
+    assert!(bytes.iter().all(|other| *other == bytes[0]));
+}
+
 impl Workshop {
     pub fn new() -> Self {
         Self { folder: TempDir::new().expect("a temporary folder"), next: Cell::new(0) }

@@ -117,11 +117,11 @@ mod tests {
         let sites: Vec<DVec2> =
             (0..40).map(|i| DVec2::new(f64::from(i % 7), f64::from(i / 7)) / 5.0).collect();
         let given: Vec<_> = sites.iter().map(|&p| exact(p, value(p))).collect();
-        let plane = Spline::through(&given).unwrap();
+        let plane = Spline::through(&given).expect("enough sites");
         let between = DVec2::new(0.513, 0.377);
         assert!((plane.at(between) - value(between)).abs() < 1e-9);
         let bumps: Vec<_> = sites.iter().map(|&p| exact(p, p.x * p.x * p.y)).collect();
-        let spline = Spline::through(&bumps).unwrap();
+        let spline = Spline::through(&bumps).expect("enough sites");
         for Site { place, value, .. } in bumps {
             assert!((spline.at(place) - value).abs() < 1e-7);
         }

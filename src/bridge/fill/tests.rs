@@ -144,7 +144,7 @@ impl Shell {
 
 fn filled(rim: &RimLoop, cell: f64) -> Fill {
     let fill = fill_loop(rim, &FillOptions { cell, crease_deg: 12.0 }).expect("a loop");
-    check_border(rim, &fill).unwrap();
+    check_border(rim, &fill).expect("bounded by the rim");
     fill
 }
 

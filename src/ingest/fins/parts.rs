@@ -6,7 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::ingest::fins::{FinStats, SheetRule};
-use crate::octree::points::{length_of, owner, snapped, unpack_ends};
+use crate::octree::points::{is_owned, length_of, unpack_ends};
 use crate::octree::{BorderUse, Domain, MOST_USES, SoupTriangle, each_border};
 use crate::store::{Labels, Resources, Scratch, Sorter, Spool, SpoolWriter, StoreError, Table};
 
@@ -173,8 +173,7 @@ impl Parts {
         domain: &Domain,
         brick: u64,
     ) -> Result<(), StoreError> {
-        let lowest = snapped(domain, triangle).into_iter().min().expect("three corners");
-        if owner(domain, lowest) != brick {
+        if !is_owned(triangle, domain, brick) {
             return Ok(());
         }
         let Some(number) = self.sheet_of(triangle.source)? else { return Ok(()) };

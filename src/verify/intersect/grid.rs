@@ -29,13 +29,18 @@ pub(crate) struct CellRange {
 }
 
 impl Grid {
-    /// The outermost grid, with cells of about a side, around the origin.
-    pub(crate) fn around_origin(side: f64) -> Self {
+    /// The outermost grid, with cells of about a side, around a point of the mesh: far from the
+    /// origin all of it would lie in the last cells of a grid around that.
+    pub(crate) fn around(middle: Point, side: f64) -> Self {
         // The nearest power of two, by the exponent's bits.
         let exponent = ((side * std::f64::consts::SQRT_2).to_bits() >> 52) as i32 - 1023;
         let exponent = exponent.clamp(-1000, 1000);
         let half = f64::from(1_u32 << (ROOT_BITS - 1));
-        Self { scale: power(-exponent), offset: [-half; 3], last: (1 << ROOT_BITS) - 1 }
+        let scale = power(-exponent);
+        // A whole number of cells, or none where that is no number.
+        let cells = middle.map(|x| (x * scale).floor());
+        let offset = cells.map(|cells| if cells.is_finite() { cells - half } else { -half });
+        Self { scale, offset, last: (1 << ROOT_BITS) - 1 }
     }
 
     /// The cell of a coordinate.
@@ -188,7 +193,7 @@ mod tests {
 
     #[test]
     fn a_grid_inside_of_a_cell_divides_it_and_takes_what_is_beyond() {
-        let root = Grid::around_origin(4.0);
+        let root = Grid::around([0.0; 3], 4.0);
         assert_eq!(root.side(), 4.0);
         let cell = [root.cell(0, 9.0), root.cell(1, -1.0), root.cell(2, 0.0)];
         assert_eq!(cell, [(1 << 20) + 2, (1 << 20) - 1, 1 << 20]);
@@ -199,5 +204,17 @@ mod tests {
         assert_eq!(wide.side(), 4.0);
         assert_eq!(wide.cell(0, 9.0), 2);
         assert_eq!(root.cell(0, f64::MAX), (1 << 21) - 1);
+    }
+
+    #[test]
+    fn a_mesh_far_from_the_origin_has_as_many_cells_as_one_there() {
+        for far in [1e6, -1e9, 1e14] {
+            let grid = Grid::around([far, 0.0, -far], 0.25);
+            let cells = [0.0, 0.25, 1.0, -1.0].map(|by| grid.cell(0, far + by));
+            let home = cells[0];
+            assert_eq!(cells, [home, home + 1, home + 4, home - 4], "{far}");
+            assert!(!grid.is_at_border(&grid.range([far, 0.0, -far], [far, 0.0, -far])));
+        }
+        assert_eq!(Grid::around([f64::MAX; 3], 1e-9).cell(0, 0.0), 1 << 20);
     }
 }

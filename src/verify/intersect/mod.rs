@@ -118,7 +118,7 @@ impl<'p> Intersections<'p> {
         let wide_bytes = self.shares.early_bytes / 8;
         let packer = |bytes| Packer::new(self.scratch, bytes, self.shares.parcel_triangles());
         let mut placed = Placed {
-            grid: Grid::around_origin(row * mean),
+            grid: Grid::around(early.first().map_or([0.0; 3], |e| e.corners[0]), row * mean),
             packer: packer(self.shares.early_bytes - wide_bytes),
             triangles: 0,
             wide: packer(wide_bytes),
