@@ -17,7 +17,7 @@ const TRIANGLES: u64 = 200_000;
 
 fn triangle(source: u64) -> SoupTriangle {
     let source = source as u32;
-    SoupTriangle { corners: [[0.5; 3]; 3], source, part: 0, material: 0, tags: 0 }
+    SoupTriangle { corners: [[0.5; 3]; 3], source, part: 0, material: 0, stands_for: 0 }
 }
 
 fn brick_files(criterion: &mut Criterion) {

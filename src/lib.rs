@@ -23,6 +23,7 @@ pub mod bridge;
 pub mod contour;
 pub mod defect;
 pub mod geom;
+pub mod hidden;
 pub mod ingest;
 pub mod io;
 pub mod mesh;

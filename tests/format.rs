@@ -81,7 +81,7 @@ fn records_of_spools_are_as_documented() {
             offset_of!(SoupTriangle, source),
             offset_of!(SoupTriangle, part),
             offset_of!(SoupTriangle, material),
-            offset_of!(SoupTriangle, tags),
+            offset_of!(SoupTriangle, stands_for),
         ],
     );
     assert_eq!(TRANSPARENT, 1 << 31);
@@ -152,7 +152,8 @@ fn a_spool_lies_on_disk_as_documented() {
     let (_folder, scratch) = scratch();
     let mut writer = SpoolWriter::create(&scratch, "soup.spool").expect("writable");
     let corners = [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0], [7.0, 8.0, 9.5]];
-    let triangle = SoupTriangle { corners, source: 11, part: 12, material: TRANSPARENT, tags: 0 };
+    let triangle =
+        SoupTriangle { corners, source: 11, part: 12, material: TRANSPARENT, stands_for: 0 };
     writer.push(triangle).expect("writable");
     writer.push(SoupTriangle { source: 13, ..triangle }).expect("writable");
     let spool = writer.finish().expect("writable");

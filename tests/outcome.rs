@@ -10,7 +10,15 @@ use support::schema::check_document;
 use support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 40] = [
+const CONDITIONAL: [&str; 48] = [
+    "hidden.largest[]",
+    "hidden.largest[].part",
+    "hidden.largest[].part_number",
+    "hidden.largest[].is_sealed",
+    "hidden.largest[].triangles",
+    "hidden.largest[].area",
+    "hidden.largest[].lo",
+    "hidden.largest[].hi",
     "input.dense_box.lo",
     "input.dense_box.hi",
     "settings.depth.auto",

@@ -16,8 +16,8 @@ use crate::support::run::{Encoding, Workshop, at_depth};
 /// So little that every long step notes its progress many times.
 const CHECKPOINT_BYTES: u64 = 64 << 10;
 const STEPS: [&str; 14] = [
-    "read", "bin", "settle", "mend", "scan", "patch", "flood", "thicken", "sign", "choose",
-    "place", "separate", "write", "prove",
+    "read", "bin", "settle", "mend", "scan", "patch", "flood", "revise", "sign", "choose", "place",
+    "separate", "write", "prove",
 ];
 
 /// A broken model, what comes of it, and images of the work on the way.

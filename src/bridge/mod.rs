@@ -249,6 +249,15 @@ fn mend_open(
     Ok(())
 }
 
+/// What an added triangle has from one of the soup.
+#[derive(Clone, Copy)]
+struct Like {
+    part: u32,
+    material: u32,
+    /// Source number of a triangle that it stands for or closes.
+    of: u32,
+}
+
 /// Triangles that are added, on their way into bins.
 struct Added<'a> {
     domain: &'a Domain,
@@ -264,15 +273,16 @@ impl<'a> Added<'a> {
         Self { domain, bins, first, next: first }
     }
 
-    /// Adds a triangle with the part and the material of `like`.
-    fn push(&mut self, corners: [[f64; 3]; 3], like: (u32, u32)) -> Result<(), StoreError> {
+    /// Adds a triangle like this one.
+    fn push(&mut self, corners: [[f64; 3]; 3], like: Like) -> Result<(), StoreError> {
         let limit = u64::from(u32::MAX);
         if self.next > limit {
             return Err(StoreError::TooMany { what: "Triangles", limit });
         }
-        let (source, (part, material)) = (self.next as u32, like);
+        let Like { part, material, of } = like;
+        let (source, stands_for) = (self.next as u32, of + 1);
         self.next += 1;
-        let triangle = SoupTriangle { corners, source, part, material, tags: 0 };
+        let triangle = SoupTriangle { corners, source, part, material, stands_for };
         let snapped = corners.map(|corner| self.domain.snap(corner));
         for_each_touched_brick(self.domain, snapped, &mut |key| {
             self.bins.push(BinTriangle { brick: key.0, triangle })

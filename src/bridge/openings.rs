@@ -153,14 +153,14 @@ impl Decision<'_> {
         self.stats.walled_area += shell.area;
         self.stats.wanted_openings += wanted.len() as u64;
         let is_free = wanted.iter().all(|opening| opening.held(self.rims)[0] < 0.5);
-        shells.wall(&sheets, is_free)?;
+        shells.wall(&sheets, is_free, self.rims[0].edge.source)?;
         Ok(true)
     }
 
     /// Puts strips into cracks, and closes what they leave.
     fn close_cracks(&mut self, strips: &Strips, added: &mut Added) -> Result<(), StoreError> {
         self.stats.joined_length += strips.length;
-        let like = (self.rims[0].edge.part, self.rims[0].edge.material);
+        let like = self.rims[0].edge.like();
         for triangle in &strips.triangles {
             added.push(triangle.map(|corner| corner.to_array()), like)?;
         }
@@ -230,7 +230,7 @@ impl Decision<'_> {
             let [p, q, r] = corners.map(|corner| corner.clamp(lo, hi));
             area += 0.5 * (q - p).cross(r - p).length();
             let corners = if is_turned { [p, q, r] } else { [q, p, r] };
-            added.push(corners.map(|p| p.to_array()), (edge.part, edge.material))?;
+            added.push(corners.map(|p| p.to_array()), edge.like())?;
         }
         // What is left between strips is no hole.
         if !is_new {

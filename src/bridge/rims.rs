@@ -9,8 +9,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::bridge::PASSING;
 use crate::bridge::sheets::{Sheets, Side};
+use crate::bridge::{Like, PASSING};
 use crate::octree::points::{owner, unpack_ends};
 use crate::octree::{BinnedSoup, BorderUse, Domain, MOST_USES, SoupTriangle, each_border};
 use crate::store::{Record, Resources, Sorter, Spool, SpoolWriter, StoreError};
@@ -51,6 +51,11 @@ impl RimEdge {
     /// The third corner of its triangle.
     pub fn opposite(&self) -> DVec3 {
         DVec3::from(self.corners[2])
+    }
+
+    /// What a triangle that closes the rim has from the one along it.
+    pub fn like(&self) -> Like {
+        Like { part: self.part, material: self.material, of: self.source }
     }
 
     pub fn length(&self) -> f64 {

@@ -29,7 +29,9 @@ pub struct Measure {
     pub volume: f64,
     pub triangles: u64,
     /// A [`Fate`], as a number.
-    pub fate: u64,
+    pub fate: u32,
+    /// Of a sheet that becomes a wall: source number of a triangle of its shell.
+    pub member: u32,
 }
 
 impl Measure {
@@ -231,8 +233,8 @@ impl<'d> Shells<'d> {
     }
 
     /// Makes walls of the sheets of a shell: behind the side that looks out where the shell holds a
-    /// volume and stands free, else on both sides.
-    pub fn wall(&mut self, sheets: &[u32], is_free: bool) -> Result<(), StoreError> {
+    /// volume and stands free, else on both sides. `member` is one of the shell's triangles.
+    pub fn wall(&mut self, sheets: &[u32], is_free: bool, member: u32) -> Result<(), StoreError> {
         let shell = self.together(sheets)?;
         let about = DVec3::from(shell.moment) / shell.area;
         let mut height = 0.0;
@@ -248,10 +250,15 @@ impl<'d> Shells<'d> {
                 height if height > 0.0 => Fate::Behind,
                 _ => Fate::Before,
             };
-            measure.fate = fate as u64;
+            (measure.fate, measure.member) = (fate as u32, member);
             self.measures.set(sheet.into(), measure)?;
         }
         Ok(())
+    }
+
+    /// A triangle of the shell of a sheet that becomes a wall.
+    pub fn member(&mut self, sheet: u32) -> Result<u32, StoreError> {
+        Ok(self.measures.get(sheet.into())?.member)
     }
 
     /// What becomes of a sheet.

@@ -19,7 +19,7 @@ use glam::DVec3;
 
 use crate::bridge::sheets::{MOST_TRIANGLES, Sheets};
 use crate::bridge::walls::Slab;
-use crate::bridge::{Added, MendOptions};
+use crate::bridge::{Added, Like, MendOptions};
 use crate::octree::points::is_owned;
 use crate::octree::{
     BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, SoupEdges, SoupTriangle,
@@ -47,8 +47,10 @@ const LEAST_HITS: f64 = 8.0;
 pub struct ThickenStats {
     /// Pieces of sheets, each in one brick, that lose hits.
     pub pieces: u64,
-    /// Triangles that got one.
+    /// Triangles that got a slab.
     pub triangles: u64,
+    /// Triangles of slabs; their source numbers follow upon those of walls and fills.
+    pub added_triangles: u64,
     /// Their area, model units squared.
     pub area: f64,
     /// Corners of the box around them, model units; empty when there is none.
@@ -158,6 +160,7 @@ pub fn thicken(
     if stats.triangles == 0 {
         return Ok(None);
     }
+    stats.added_triangles = added.next - first;
     add_all(soup, &mut added.bins)?;
     let (triangles, entries) = write_bins(added.bins, THICKENED, resources)?;
     Ok(Some((Thickened { triangles, entries }, stats)))
@@ -180,7 +183,8 @@ fn surround(
     let normal = (q - p).cross(r - p).normalize_or_zero();
     let half = 0.5 * options.thickness;
     let slab = Slab::new(triangle, [normal; 3], [-half, half], &options.bounds.grown(half));
-    slab.push([true; 3], false, added, (triangle.part, triangle.material))
+    let like = Like { part: triangle.part, material: triangle.material, of: triangle.source };
+    slab.push([true; 3], false, added, like)
 }
 
 /// What was added before is added again.

@@ -13,7 +13,7 @@ use glam::DVec3;
 use crate::bridge::miters::{Miter, MiterUse, find_miters};
 use crate::bridge::sheets::Sheets;
 use crate::bridge::shells::{Fate, Shells};
-use crate::bridge::{Added, MendOptions};
+use crate::bridge::{Added, Like, MendOptions};
 use crate::octree::points::{is_owned, pack_point, snapped};
 use crate::octree::{BinnedSoup, BorderUse, DropRecord, SnapBox, SoupTriangle};
 use crate::store::{Record, Resources, Sorted, Sorter, Spool, StoreError};
@@ -23,14 +23,15 @@ use crate::store::{Record, Resources, Sorted, Sorter, Spool, StoreError};
 #[repr(C)]
 struct WallTriangle {
     triangle: SoupTriangle,
-    /// The fate of its sheet.
-    fate: u32,
-    /// [`IS_TURNED`], [`IS_ONE_SIDED`].
+    /// A triangle of its shell.
+    member: u32,
+    /// The fate of its sheet, [`IS_TURNED`], [`IS_ONE_SIDED`].
     flags: u32,
 }
 
-const IS_TURNED: u32 = 1;
-const IS_ONE_SIDED: u32 = 2;
+const FATE: u32 = 3;
+const IS_TURNED: u32 = 4;
+const IS_ONE_SIDED: u32 = 8;
 
 impl Record for WallTriangle {
     type Key = u32;
@@ -87,7 +88,8 @@ pub fn raise_walls(
             }
             let flags = if side.is_turned { IS_TURNED } else { 0 }
                 | if side.is_one_sided { IS_ONE_SIDED } else { 0 };
-            triangles.push(WallTriangle { triangle: *triangle, fate: fate as u32, flags })?;
+            let (member, flags) = (shells.member(sheet)?, fate as u32 | flags);
+            triangles.push(WallTriangle { triangle: *triangle, member, flags })?;
             let normal = normal_of(triangle, side.is_turned).to_array();
             for (corner, point) in corners.into_iter().enumerate() {
                 let packed = pack_point(point);
@@ -174,7 +176,7 @@ impl Builder {
             }
             self.next_end = self.ends.next()?;
         }
-        let (low, high) = match wall.fate {
+        let (low, high) = match wall.flags & FATE {
             _ if is_one_sided => (-0.5, 0.5),
             fate if fate == Fate::Behind as u32 => (-1.0, 0.0),
             fate if fate == Fate::Before as u32 => (0.0, 1.0),
@@ -183,7 +185,8 @@ impl Builder {
         let is_turned = wall.flags & IS_TURNED != 0;
         let by = [low, high].map(|by| by * self.thickness);
         let slab = Slab::new(triangle, miters, by, &self.room);
-        slab.push(has_end, is_turned, added, (triangle.part, triangle.material))
+        let like = Like { part: triangle.part, material: triangle.material, of: wall.member };
+        slab.push(has_end, is_turned, added, like)
     }
 }
 
@@ -214,7 +217,7 @@ impl Slab {
         has_end: [bool; 3],
         is_turned: bool,
         added: &mut Added,
-        like: (u32, u32),
+        like: Like,
     ) -> Result<(), StoreError> {
         let mut put = |corners: [DVec3; 3]| {
             let [p, q, r] = corners.map(|c| c.to_array());

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use brickmend::contour::Method;
 use brickmend::ingest::SheetRule;
-use brickmend::repair::{Depth, Length, Limits, MaxHole, Reach, Settings, ThinRule};
+use brickmend::repair::{Depth, HiddenRule, Length, Limits, MaxHole, Reach, Settings, ThinRule};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
 
@@ -32,6 +32,9 @@ pub struct ResultArguments {
     /// What becomes of walls thinner than a cell.
     #[arg(long, value_enum, default_value_t = ThinRuleName::Deeper)]
     thin: ThinRuleName,
+    /// What becomes of parts that nobody sees from outside; with --fill-rule solid.
+    #[arg(long, value_enum, default_value_t = HiddenRuleName::Remove)]
+    hidden: HiddenRuleName,
     /// Thickness of the walls that sheets without thickness become; in cells (2cells), model units,
     /// or % of the bounding box diagonal.
     #[arg(long, value_name = "LENGTH", default_value = "2cells", value_parser = parse_length)]
@@ -110,6 +113,14 @@ enum ThinRuleName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum HiddenRuleName {
+    /// They go, and are named in the outcome.
+    Remove,
+    /// They stay, unless they are sealed in.
+    Keep,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MethodName {
     /// Manifold dual contouring: creases and corners stay sharp.
     Mdc,
@@ -155,6 +166,10 @@ impl ResultArguments {
             ThinRuleName::Thicken => ThinRule::Thicken,
             ThinRuleName::Drop => ThinRule::Drop,
         };
+        let hidden = match self.hidden {
+            HiddenRuleName::Remove => HiddenRule::Remove,
+            HiddenRuleName::Keep => HiddenRule::Keep,
+        };
         let (max_hole, max_gap) = (self.max_hole, self.max_gap);
         let sheet_thickness = self.sheet_thickness;
         let (crease_deg, strict) = (self.crease, self.strict);
@@ -165,6 +180,7 @@ impl ResultArguments {
             fill_rule,
             sheets,
             thin,
+            hidden,
             max_hole,
             max_gap,
             sheet_thickness,

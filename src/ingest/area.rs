@@ -114,7 +114,7 @@ mod tests {
     }
 
     fn triangle(corners: [[f64; 3]; 3]) -> SoupTriangle {
-        SoupTriangle { corners, source: 0, part: 0, material: 0, tags: 0 }
+        SoupTriangle { corners, source: 0, part: 0, material: 0, stands_for: 0 }
     }
 
     #[test]

@@ -95,7 +95,7 @@ mod tests {
         let x = f64::from(kind);
         let mut corners = [[x, 0.0, 1.0], [x, 2.0, -0.0], [0.5, x, 3.0]];
         corners.rotate_left(source as usize % 3);
-        SoupTriangle { corners, source, part: 0, material: 0, tags: 0 }
+        SoupTriangle { corners, source, part: 0, material: 0, stands_for: 0 }
     }
 
     proptest! {

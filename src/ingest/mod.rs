@@ -20,6 +20,7 @@ mod error;
 mod examine;
 mod facts;
 mod fins;
+mod names;
 mod packed;
 mod rims;
 #[cfg(test)]
@@ -33,6 +34,7 @@ pub use crowds::LeftOut;
 pub use duplicates::{DROPS, SettleStats, Settled, settle};
 pub use error::IngestError;
 pub use fins::{FinStats, SheetRule, drop_fins};
+pub use names::{PART_NAMES, names_of_parts};
 pub use rims::Rims;
 pub use soup::{ATTRIBUTES, AttributeRecord, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use sums::{SoupSums, sum_up};

@@ -4,6 +4,7 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
+use crate::ingest::names::{PART_NAMES, write_names};
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
@@ -70,6 +71,8 @@ pub struct Soup {
     pub spool: Spool<SoupTriangle>,
     /// Texture coordinates and colours, where the file has any.
     pub attributes: Option<Spool<AttributeRecord>>,
+    /// Names of the parts, see [`crate::ingest::PART_NAMES`].
+    pub names: Spool<u8>,
     /// What was found out.
     pub facts: SoupFacts,
 }
@@ -88,6 +91,7 @@ impl Soup {
         Ok(Self {
             spool: Spool::open(resources.scratch, FileState::find(files, SOUP)?)?,
             attributes: attributes.map(|f| Spool::open(resources.scratch, f)).transpose()?,
+            names: Spool::open(resources.scratch, FileState::find(files, PART_NAMES)?)?,
             facts,
         })
     }
@@ -96,7 +100,10 @@ impl Soup {
     #[must_use]
     pub fn files(&self) -> Vec<FileState> {
         let attributes = self.attributes.as_ref().map(|spool| spool.state().clone());
-        std::iter::once(self.spool.state().clone()).chain(attributes).collect()
+        [self.spool.state().clone(), self.names.state().clone()]
+            .into_iter()
+            .chain(attributes)
+            .collect()
     }
 }
 
@@ -134,8 +141,10 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     };
     stats.refuse_broken(strict)?;
     let (parts, materials) = (source.part_count(), source.material_count());
+    let names = write_names(source, resources)?;
     Ok(Soup {
         spool: writer.spool.finish()?,
+        names,
         attributes: writer.attributes.map(SpoolWriter::finish).transpose()?,
         facts: SoupFacts { bounds: writer.bounds, parts, materials, stats },
     })
@@ -189,7 +198,7 @@ impl<'r> Writer<'r> {
             let material = self.marked_material(batch.materials[i], source)?;
             let part = batch.parts[i];
             let triangle =
-                SoupTriangle { corners: *corners, source: number, part, material, tags: 0 };
+                SoupTriangle { corners: *corners, source: number, part, material, stands_for: 0 };
             self.spool.push(triangle)?;
         }
         Ok(())

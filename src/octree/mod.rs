@@ -8,10 +8,12 @@ mod cell_brick;
 mod domain;
 mod edge_bits;
 mod edge_brick;
+mod exposed;
 mod flips;
 mod index;
 mod key;
 mod lost;
+mod occupancy;
 mod plane;
 pub(crate) mod points;
 mod region;
@@ -34,10 +36,12 @@ pub use edge_bits::{
     AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,
 };
 pub use edge_brick::{ArchivedEdgeBrick, EdgeBrick, decode_edges};
+pub use exposed::{BURIED, ExposedPlace, LOST, Touched};
 pub use flips::{FLIPS, Flip, FlipReader, FlipRecord, Flips};
 pub use index::{BrickIndex, Neighbour};
 pub use key::BrickKey;
 pub use lost::LostHits;
+pub use occupancy::{InsideCorners, Occupancy};
 pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
 pub use soup_edges::{BorderUse, MOST_USES, SoupEdges, TrianglePair, each_border};

@@ -19,8 +19,9 @@ pub struct SoupTriangle {
     pub part: u32,
     /// Material number, and [`TRANSPARENT`].
     pub material: u32,
-    /// Reserved for bridges and fills; zero.
-    pub tags: u32,
+    /// For walls and fills: one more than the source number of a triangle that they stand for or
+    /// close; 0 for triangles of the input.
+    pub stands_for: u32,
 }
 
 /// A triangle in the bin of a brick that it touches. 96 bytes.

@@ -19,6 +19,7 @@ mod lock;
 mod mending;
 mod outcome;
 mod plan;
+mod revising;
 mod run;
 mod settings;
 mod stages;
@@ -37,4 +38,4 @@ pub use outcome::{
 };
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, Limits, MaxHole, Settings, ThinRule};
+pub use settings::{Depth, HiddenRule, Limits, MaxHole, Settings, ThinRule};

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::bridge::{MendStats, ThickenStats};
 use crate::contour::ContourStats;
+use crate::hidden::HiddenStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
 use crate::monitor::{Counter, Gauge, Stage};
 use crate::octree::{Domain, SnapBox};
@@ -184,6 +185,8 @@ pub struct Outcome {
     pub mend: MendStats,
     /// Counts of what was thickened.
     pub thickened: ThickenStats,
+    /// What nobody sees.
+    pub hidden: HiddenStats,
     /// Counts of scan, patch and sign.
     pub scan: ScanStats,
     /// See `scan`.

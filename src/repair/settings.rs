@@ -56,6 +56,17 @@ pub enum ThinRule {
     Drop,
 }
 
+/// What becomes of parts that nobody sees.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum HiddenRule {
+    /// They go, with the fill rule `solid`; the others keep what is within.
+    #[default]
+    Remove,
+    /// They stay where the outside touches them.
+    Keep,
+}
+
 /// Which openings are filled; the others are wanted, and what they open into gets walls.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -92,6 +103,8 @@ pub struct Settings {
     pub sheets: SheetRule,
     /// What becomes of walls thinner than a cell.
     pub thin: ThinRule,
+    /// What becomes of parts that nobody sees.
+    pub hidden: HiddenRule,
     /// Which openings are filled.
     pub max_hole: MaxHole,
     /// Rims that are no farther apart than this face each other across a crack.
@@ -118,6 +131,7 @@ impl Default for Settings {
             fill_rule: FillRule::Solid,
             sheets: SheetRule::Thicken,
             thin: ThinRule::Deeper,
+            hidden: HiddenRule::Remove,
             max_hole: MaxHole::Auto,
             max_gap: Reach::Cells(2.0),
             sheet_thickness: Reach::Cells(2.0),

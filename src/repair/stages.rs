@@ -7,6 +7,7 @@ use crate::contour::{
     CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
     write_surface,
 };
+use crate::hidden::HiddenStats;
 use crate::ingest::{
     Bins, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins, read_soup,
     settle,
@@ -26,7 +27,7 @@ use crate::repair::run::Run;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
-use crate::sign::{FillRule, Flooded, SIGNS, SignStats, VoteStats, assign_signs, flood};
+use crate::sign::{FillRule, FloodStats, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, StoreError};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
 
@@ -58,7 +59,8 @@ pub struct Findings {
     pub deeper: Option<Domain>,
     pub scan: ScanStats,
     pub patch: PatchStats,
-    pub votes: VoteStats,
+    pub flood: FloodStats,
+    pub hidden: HiddenStats,
     pub sign: SignStats,
     /// The threshold, cells, where it was raised for fewer triangles.
     raised_cells: Option<f64>,
@@ -135,7 +137,7 @@ impl Run<'_> {
             Step::Flood => {
                 flood_bricks(self.settings.fill_rule, workspace, findings, handles, resources)?
             }
-            Step::Thicken => self.thicken(workspace, findings, handles, resources)?,
+            Step::Revise => self.revise(workspace, findings, handles, resources)?,
             Step::Sign => self.sign(workspace, findings, handles, resources)?,
             Step::Choose => self.choose(workspace, findings, handles, resources)?,
             Step::Place => self.place(workspace, findings, handles, resources)?,
@@ -153,7 +155,7 @@ impl Run<'_> {
             Step::Read => std::fs::metadata(self.input).map_or(0, |file| file.len()),
             Step::Bin => findings.soup().stats.triangles,
             Step::Settle | Step::Scan => findings.bins,
-            Step::Mend | Step::Thicken => 0,
+            Step::Mend | Step::Revise => 0,
             Step::Patch => findings.scan.open_bricks,
             Step::Flood | Step::Sign => findings.scan.bricks,
             Step::Choose if self.settings.max_triangles.is_some() => {
@@ -441,8 +443,8 @@ fn flood_bricks(
 ) -> Result<Vec<FileState>, RepairError> {
     let flips = Flips::open(resources, &workspace.files())?;
     let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
-    let (flooded, votes) =
+    let (flooded, stats) =
         flood(hits, &flips, rule, findings.domain(), resources).map_err(RepairError::Sign)?;
-    findings.votes = votes;
+    findings.flood = stats;
     Ok(flooded.files())
 }

@@ -5,6 +5,7 @@ use serde::de::IgnoredAny;
 
 use crate::bridge;
 use crate::contour::LOOKS;
+use crate::hidden;
 use crate::io::FACES;
 use crate::mesh::SinkFile;
 use crate::repair::step::{OUTPUT_PART, Step};
@@ -13,12 +14,15 @@ use crate::store::Manifest;
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 10] = [
+pub const PASSING: [&str; 13] = [
     "facts.spool",
     bridge::PASSING[0],
     bridge::PASSING[1],
     bridge::THICKENED[0],
     bridge::THICKENED[1],
+    hidden::SEEN[0],
+    hidden::SEEN[1],
+    hidden::SEEN[2],
     "faces.spool",
     "even.spool",
     FACES,

@@ -5,7 +5,7 @@
 
 use crate::bridge::{ADDED, ADDED_ENTRIES, LEFT_OUT};
 use crate::contour::{CELLS, SURFACE};
-use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, SOUP};
+use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, PART_NAMES, SOUP};
 use crate::monitor::Stage;
 use crate::octree::FLIPS;
 use crate::scan::HITS;
@@ -31,8 +31,9 @@ pub enum Step {
     Patch,
     /// What the outside reaches.
     Flood,
-    /// What the grid would lose is thickened, and scanned, patched and flooded again.
-    Thicken,
+    /// What the grid would lose is thickened, what nobody sees is left out, and all is scanned,
+    /// patched and flooded again.
+    Revise,
     /// Hits and flips become signs.
     Sign,
     /// The threshold is found that gives few enough triangles, where a number is set.
@@ -57,7 +58,7 @@ impl Step {
         Self::Scan,
         Self::Patch,
         Self::Flood,
-        Self::Thicken,
+        Self::Revise,
         Self::Sign,
         Self::Choose,
         Self::Place,
@@ -76,7 +77,7 @@ impl Step {
             Self::Scan => "scan",
             Self::Patch => "patch",
             Self::Flood => "flood",
-            Self::Thicken => "thicken",
+            Self::Revise => "revise",
             Self::Sign => "sign",
             Self::Choose => "choose",
             Self::Place => "place",
@@ -90,7 +91,7 @@ impl Step {
     pub const fn stage(self) -> Stage {
         match self {
             Self::Read | Self::Bin | Self::Settle => Stage::Ingest,
-            Self::Mend | Self::Thicken => Stage::Bridge,
+            Self::Mend | Self::Revise => Stage::Bridge,
             Self::Scan => Stage::Scan,
             Self::Patch => Stage::Patch,
             Self::Flood | Self::Sign => Stage::Sign,
@@ -102,7 +103,7 @@ impl Step {
     /// The files that it leaves. `attributes.spool` is there only if the input has attributes.
     pub const fn writes(self) -> &'static [&'static str] {
         match self {
-            Self::Read => &[SOUP, ATTRIBUTES],
+            Self::Read => &[SOUP, ATTRIBUTES, PART_NAMES],
             Self::Bin => &[BINS, BIN_ENTRIES],
             Self::Settle => &[DROPS],
             Self::Mend => &[LEFT_OUT, ADDED, ADDED_ENTRIES],
@@ -114,7 +115,7 @@ impl Step {
             Self::Separate => &[SURFACE],
             Self::Write => &[OUTPUT_PART],
             // It makes files of before anew.
-            Self::Thicken | Self::Choose | Self::Prove => &[],
+            Self::Revise | Self::Choose | Self::Prove => &[],
         }
     }
 
@@ -122,14 +123,15 @@ impl Step {
     pub const fn reads(self) -> &'static [&'static str] {
         match self {
             Self::Read => &[],
-            Self::Bin => &[SOUP],
+            Self::Bin => &[SOUP, PART_NAMES],
             Self::Settle => &[BINS, BIN_ENTRIES],
             Self::Mend => &[BINS, BIN_ENTRIES, DROPS],
             Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
             Self::Patch => &[HITS],
             Self::Flood => &[HITS, FLIPS],
-            Self::Thicken => &[
+            Self::Revise => &[
                 SOUP,
+                PART_NAMES,
                 BINS,
                 BIN_ENTRIES,
                 LEFT_OUT,

@@ -100,6 +100,17 @@ impl Exterior {
         })
     }
 
+    /// How many sets of the first `regions` regions the outside does not reach.
+    pub fn closed_volumes(&mut self, regions: u64) -> Result<u64, StoreError> {
+        let mut volumes = 0;
+        // A set is told of by its smallest member, and empty space comes after all regions.
+        for region in 0..regions as u32 {
+            let label = self.strict.label(region)?;
+            volumes += u64::from(label == region && label != self.strict_outside);
+        }
+        Ok(volumes)
+    }
+
     /// Reached past no hit at all.
     pub fn reaches(&mut self, region: u32) -> Result<bool, StoreError> {
         Ok(self.strict.label(region)? == self.strict_outside)
@@ -261,6 +272,11 @@ fn push_sides(
 }
 
 impl RegionGraph {
+    /// The number of regions.
+    pub fn region_count(&self) -> u64 {
+        self.regions
+    }
+
     /// Unites all and finds what the outside reaches.
     pub fn flood(
         &mut self,

@@ -10,6 +10,7 @@
 //! Fails:      [`SignError`]: the scratch disk, or bricks that contradict each other.
 //! Source:     Ju 2004, section 5 (sign generation); the region graph and its barrier are ours.
 
+mod exposed;
 mod flooded;
 mod graph;
 mod load;
@@ -28,6 +29,7 @@ use crate::sign::parity::base_parities;
 use crate::sign::relabel::relabel;
 use crate::store::{BrickFile, Resources, StoreError};
 
+pub use exposed::{Exposed, find_exposed};
 pub use flooded::{FLOODED, Flooded, FloodedBrick, REGIONS};
 pub use thin::find_lost;
 pub use winding::VoteStats;
@@ -66,6 +68,15 @@ pub enum FillRule {
     Nonzero,
     /// Ju's parity: inside after an odd number of walls.
     Evenodd,
+}
+
+/// What the flood found.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct FloodStats {
+    /// Connected volumes that the outside does not reach.
+    pub closed_volumes: u64,
+    /// Votes on winding numbers, with the fill rule `nonzero`.
+    pub votes: VoteStats,
 }
 
 /// Counts of sign generation. Volumes are in cells.
@@ -128,18 +139,20 @@ pub fn flood(
     rule: FillRule,
     domain: &Domain,
     resources: &Resources,
-) -> Result<(Flooded, VoteStats), SignError> {
+) -> Result<(Flooded, FloodStats), SignError> {
     let mut graph = build_graph(hits, flips, rule, resources)?;
     let keys = graph.bricks.iter().map(|brick| brick.key).collect();
     let index = BrickIndex::new(keys, domain.bricks_per_side());
-    let exterior = graph.flood(&index, resources)?;
+    let mut exterior = graph.flood(&index, resources)?;
     let parities = base_parities(&graph.bricks);
     let votes = exterior.vote_stats();
+    let closed_volumes = exterior.closed_volumes(graph.region_count())?;
     if votes.fell_back {
         let note = "triangles contradict each other in where is inside: filled as solid";
         resources.monitor.note(note);
     }
-    Ok((Flooded::write(&graph.bricks, &parities, exterior, resources)?, votes))
+    let flooded = Flooded::write(&graph.bricks, &parities, exterior, resources)?;
+    Ok((flooded, FloodStats { closed_volumes, votes }))
 }
 
 /// Decides all signs.

@@ -42,4 +42,4 @@ pub use table::Table;
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.
-pub const FORMAT_VERSION: u32 = 4;
+pub const FORMAT_VERSION: u32 = 5;

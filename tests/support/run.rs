@@ -111,6 +111,13 @@ impl Workshop {
         path
     }
 
+    /// Writes a text.
+    pub fn write_text(&self, extension: &str, text: &str) -> PathBuf {
+        let path = self.path("text", extension);
+        std::fs::write(&path, text).expect("the folder is writable");
+        path
+    }
+
     /// Repairs a file into a new one.
     pub fn repair(
         &self,
