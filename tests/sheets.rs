@@ -144,3 +144,25 @@ fn a_sheet_of_many_triangles_was_made_on_purpose_and_stays() {
     let (outcome, _) = with_rule(&soup, SheetRule::Thicken, 6);
     assert_eq!(outcome.found.settle.fins.triangles, 0);
 }
+
+#[test]
+fn boxes_that_share_edges_stay_closed_beside_a_sheet() {
+    // All four edges of the floor's underside lie on edges of the walls, so it is a sheet of its own.
+    let walls = [
+        ([0.0, 0.0, 0.0], [0.1, 1.0, 1.0]),
+        ([0.9, 0.0, 0.0], [1.0, 1.0, 1.0]),
+        ([0.0, 0.0, 0.0], [1.0, 0.1, 1.0]),
+        ([0.0, 0.9, 0.0], [1.0, 1.0, 1.0]),
+    ];
+    let mut soup = cuboid([0.0; 3], [1.0, 1.0, 0.1]);
+    walls.iter().for_each(|&(lo, hi)| soup.extend(cuboid(lo, hi)));
+    let (_, alone) = repair_soup(&soup, &at_depth(6)).expect("a result");
+    let corner = |x: f64, y: f64| [x, y, 1.5];
+    let sheet = [corner(0.3, 0.3), corner(0.6, 0.3), corner(0.6, 0.6)];
+    soup.push(sheet);
+    let (outcome, surface) = repair_soup(&soup, &at_depth(6)).expect("a result");
+    assert_eq!((outcome.mend.walled_shells, outcome.mend.walled_triangles), (1, 1));
+    let slab = surface.proof.volume - alone.proof.volume;
+    let expected = 0.045 * 2.0 * outcome.cell_size;
+    assert!(slab > 0.7 * expected && slab < 1.3 * expected, "{slab} for {expected}");
+}

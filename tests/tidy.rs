@@ -61,6 +61,8 @@ const HOMES: [(&str, &[&str]); 17] = [
             // These hand on the aligned bytes that `encode` returns.
             "scan/mod.rs",
             "sign/relabel.rs",
+            "sign/exposed.rs",
+            "sign/panes.rs",
             "sign/thin.rs",
             "contour/mc/vertices.rs",
         ],

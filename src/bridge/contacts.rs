@@ -48,7 +48,7 @@ pub struct Contact {
     pub rim: u32,
     pub index: u32,
     /// Number of the sheet whose rim covers it; [`ON_FACE`] where it ends on a face, [`LYING`] where
-    /// it lies on one.
+    /// it lies on one, [`GLAZED`] where a pane is beside it.
     pub sheet: u32,
     /// How far the rim that covers it is, in cells; 0 for faces.
     pub apart: f32,
@@ -58,6 +58,9 @@ pub struct Contact {
 pub const ON_FACE: u32 = u32::MAX;
 /// In [`Contact::sheet`]: the rim lies on a face.
 pub const LYING: u32 = u32::MAX - 1;
+
+/// In [`Contact::sheet`]: a pane closes the opening there, through which one looks.
+pub const GLAZED: u32 = u32::MAX - 2;
 
 impl Record for Contact {
     type Key = (u32, u32, u32);
@@ -112,7 +115,11 @@ pub fn find_contacts(
                 for (sample, ends) in grid.samples_near(triangle) {
                     if ends != Ends::Beside && covers(&sheets, triangle.source, sample, ends)? {
                         let (rim, index) = (sample.rim, sample.index);
-                        let sheet = if ends == Ends::Lying { LYING } else { ON_FACE };
+                        let sheet = match ends {
+                            _ if triangle.is_pane() && sample.is_pane == 0 => GLAZED,
+                            Ends::Lying => LYING,
+                            _ => ON_FACE,
+                        };
                         outbox.push(Contact { rim, index, sheet, apart: 0.0 })?;
                     }
                 }
@@ -234,7 +241,8 @@ impl<'s> SampleGrid<'s> {
             .map(move |entry| &samples[entry.1 as usize])
     }
 
-    /// Of each sample the sheets whose rims face it, and how far the nearest of each is.
+    /// Of each sample the sheets whose rims face it, and how far the nearest of each is. Panes and
+    /// opaque sheets do not close each other.
     fn facing_rims(&self) -> impl Iterator<Item = Vec<(u32, f64)>> {
         self.samples.iter().map(|sample| {
             let home = sample.at.map(|c| (c / self.reach).floor() as i64);
@@ -243,9 +251,14 @@ impl<'s> SampleGrid<'s> {
                 let cube = [0, 1, 2].map(|a| home[a] + at / 3_i64.pow(a as u32) % 3 - 1);
                 for other in self.in_cube(cube).filter(|other| faces(sample, other, self.reach)) {
                     let apart = sample.place().distance(other.place());
-                    match found.iter().position(|(sheet, _)| *sheet == other.sheet) {
+                    let of = match [sample.is_pane, other.is_pane] {
+                        [0, 1] => GLAZED,
+                        [1, 0] => continue,
+                        _ => other.sheet,
+                    };
+                    match found.iter().position(|(sheet, _)| *sheet == of) {
                         Some(known) => found[known].1 = found[known].1.min(apart),
-                        None if found.len() < MOST_SHEETS => found.push((other.sheet, apart)),
+                        None if found.len() < MOST_SHEETS => found.push((of, apart)),
                         None => {}
                     }
                 }

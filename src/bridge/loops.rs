@@ -75,6 +75,17 @@ impl Opening {
         [held, lying].map(|part| part / length.max(f64::MIN_POSITIVE))
     }
 
+    /// The share of its length that panes are beside.
+    pub fn glazed(&self, rims: &[ShellRim]) -> f64 {
+        let sum = |weight: fn(&ShellRim) -> f64| -> f64 {
+            self.steps
+                .iter()
+                .map(|step| rims[step.rim].edge.length() * weight(&rims[step.rim]))
+                .sum()
+        };
+        sum(|rim| rim.cover.glazed) / sum(|_| 1.0).max(f64::MIN_POSITIVE)
+    }
+
     /// Area of the fan from the middle of the loop: not less than that of a flat fill.
     pub fn area(&self, rims: &[ShellRim]) -> f64 {
         let ends = |step: &Step| {

@@ -6,7 +6,8 @@
 //! ends on (a T-junction). Sheets whose rims cover each other are one *shell*. What is left open of
 //! a shell are its *openings*: one that is large for its shell is wanted, and the shell gets walls
 //! with thickness; any other is filled with triangles. Cracks narrower than a cell are left to the
-//! scan, which they do not bother, and all that is tangled to the patch.
+//! scan, which they do not bother, and all that is tangled to the patch. Panes, which light passes,
+//! cover nothing opaque and are walls of their own; an opening beside a pane is wanted.
 //!
 //! In:         bins of the soup, without what was dropped.
 //! Out:        [`Mended`]: triangles in bins that are added, and the drops with those of sheets
@@ -43,7 +44,7 @@ use crate::bridge::sheets::Sheets;
 use crate::bridge::shells::Shells;
 use crate::bridge::walls::raise_walls;
 use crate::octree::{
-    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SnapBox, SoupEdges,
+    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, Panes, SnapBox, SoupEdges,
     SoupTriangle, for_each_touched_brick, write_bins,
 };
 use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError};
@@ -182,8 +183,18 @@ impl Mended {
     }
 }
 
-/// Mends a soup; `triangles` is the number of source numbers, `rim_edges` that of edges
-/// with an odd number of triangles.
+/// What is known of a soup that is to be mended.
+#[derive(Clone, Copy, Debug)]
+pub struct Known {
+    /// How many source numbers there are.
+    pub triangles: u64,
+    /// Edges with an odd number of triangles.
+    pub rim_edges: u64,
+    /// Whether light passes some of them.
+    pub has_panes: bool,
+}
+
+/// Mends a soup.
 ///
 /// # Errors
 /// The scratch disk fails, or the caller cancels.
@@ -191,17 +202,18 @@ pub fn mend(
     soup: &BinnedSoup,
     options: &MendOptions,
     domain: &Domain,
-    (triangles, rim_edges): (u64, u64),
+    known: Known,
     resources: &Resources,
 ) -> Result<(Mended, MendStats), StoreError> {
     let least_gap = LEAST_GAP_CELLS * domain.cell_size();
     let options = &MendOptions { max_gap: options.max_gap.max(least_gap), ..*options };
+    let Known { triangles, rim_edges, has_panes } = known;
     let mut stats = MendStats::default();
     let mut added = Added::new(domain, triangles, resources);
     let mut drops = Sorter::<DropRecord>::new(resources.scratch, resources.share_bytes / 4);
     if triangles > sheets::MOST_TRIANGLES {
         stats.crowded_rims = rim_edges;
-    } else if rim_edges > 0 {
+    } else if rim_edges > 0 || has_panes {
         mend_open(soup, options, (&mut added, &mut drops), &mut stats, resources)?;
     }
     stats.added_triangles = added.next - triangles;
@@ -230,7 +242,7 @@ fn mend_open(
     resources: &Resources,
 ) -> Result<(), StoreError> {
     let domain = added.domain;
-    let SoupEdges { pairs, borders } = SoupEdges::find(soup, domain, resources)?;
+    let SoupEdges { pairs, borders } = SoupEdges::find(soup, domain, Panes::Apart, resources)?;
     let mut sheets = Sheets::join(pairs, added.first, resources)?;
     let borders = sheets::spool_borders(borders, resources)?;
     let rims = find_rims(soup, &borders, &mut sheets, domain, resources)?;

@@ -33,6 +33,9 @@ const LYING_SHARE: f64 = 0.9;
 /// More than this of a rim on another part's face: the two run flush there.
 const FLUSH_SHARE: f64 = 0.2;
 
+/// An opening is a window where panes are beside so much of its rim.
+const GLAZED_SHARE: f64 = 0.5;
+
 /// Less open rim than this is left to the patch.
 const LEAST_OPEN_CELLS: f64 = 4.0;
 
@@ -177,9 +180,12 @@ impl Decision<'_> {
         let share = opening.area(self.rims) / area;
         let [_, lying] = opening.held(self.rims);
         match self.options.holes {
-            // A panel that lies on a face is a part of it, as a decal is.
-            _ if share > PANEL_SHARE => lying < LYING_SHARE,
+            // A panel that lies on a face is a part of it, as a decal is; a pane may as well be set
+            // into a frame that it is flush with.
+            _ if share > PANEL_SHARE => lying < LYING_SHARE || self.rims[0].edge.is_pane(),
             HoleRule::All => false,
+            // One looks through it at the inside, or it is a pane itself.
+            HoleRule::Auto if self.is_looked_through(opening) => true,
             // Cut open by a part that runs flush with it, it is no vessel: parts unite.
             HoleRule::Auto if lying > FLUSH_SHARE && lying < LYING_SHARE => false,
             HoleRule::Auto => share > WANTED_SHARE,
@@ -188,6 +194,10 @@ impl Decision<'_> {
                 lo.distance(hi) > size
             }
         }
+    }
+
+    fn is_looked_through(&self, opening: &Opening) -> bool {
+        opening.glazed(self.rims) > GLAZED_SHARE || self.rims[0].edge.is_pane()
     }
 
     /// Whether the shell is one sheet, held by a part of its rim, that a fill of the whole rim

@@ -12,7 +12,9 @@ use glam::DVec3;
 use crate::bridge::sheets::{Sheets, Side};
 use crate::bridge::{Like, PASSING};
 use crate::octree::points::{owner, unpack_ends};
-use crate::octree::{BinnedSoup, BorderUse, Domain, MOST_USES, SoupTriangle, each_border};
+use crate::octree::{
+    BinnedSoup, BorderUse, Domain, MOST_USES, SoupTriangle, TRANSPARENT, each_border,
+};
 use crate::store::{Record, Resources, Sorter, Spool, SpoolWriter, StoreError};
 
 /// An edge of a rim. 96 bytes.
@@ -56,6 +58,11 @@ impl RimEdge {
     /// What a triangle that closes the rim has from the one along it.
     pub fn like(&self) -> Like {
         Like { part: self.part, material: self.material, of: self.source }
+    }
+
+    /// Whether light passes its triangle.
+    pub fn is_pane(&self) -> bool {
+        self.material & TRANSPARENT != 0
     }
 
     pub fn length(&self) -> f64 {
@@ -139,13 +146,15 @@ fn pick(
         sides.push((sheets.side_of(border.source)?, *border));
     }
     sides.sort_by_key(|(side, border)| (side.first, border.source));
-    for group in sides.chunk_by(|a, b| a.0.first == b.0.first) {
+    let groups = || sides.chunk_by(|a, b| a.0.first == b.0.first);
+    let odd = groups().filter(|group| group.len() % 2 == 1).count();
+    for group in groups() {
         if group.len() % 2 == 0 {
             continue;
         }
         let (side, border) = group[0];
-        let others = sides.chunk_by(|a, b| a.0.first == b.0.first);
-        let is_held = others.filter(|o| o[0].0.first != side.first).any(|o| o.len() > 1);
+        // Rims that share the edge face each other, as those of a box do whose edges lie on another.
+        let is_held = odd == 1 && groups().any(|g| g[0].0.first != side.first && g.len() > 1);
         let brick = owner(domain, unpack_ends(border.ends)[0]);
         let flags = if is_held { HELD } else { 0 } | if side.is_turned { TURNED } else { 0 };
         let sheet = sheets.enter(side.first)?;

@@ -12,7 +12,7 @@ use crate::bridge::rims::{HELD, RimEdge};
 use crate::octree::{BrickKey, Domain};
 use crate::store::{Record, Resources, Sorter, Spool, StoreError};
 
-/// A point of a rim. 56 bytes.
+/// A point of a rim. 64 bytes.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct RimSample {
@@ -26,6 +26,10 @@ pub struct RimSample {
     pub out: [f32; 3],
     /// Number of the sheet.
     pub sheet: u32,
+    /// 1 where light passes it.
+    pub is_pane: u32,
+    /// Zero.
+    pub unused: u32,
 }
 
 impl RimSample {
@@ -90,8 +94,16 @@ fn sample(
             for y in lo[1]..=hi[1] {
                 for x in lo[0]..=hi[0] {
                     let brick = BrickKey::new([x, y, z]).0;
-                    let (rim, at, sheet) = (number, at.to_array(), rim.sheet);
-                    samples.push(RimSample { brick, rim, index, at, out, sheet })?;
+                    samples.push(RimSample {
+                        brick,
+                        rim: number,
+                        index,
+                        at: at.to_array(),
+                        out,
+                        sheet: rim.sheet,
+                        is_pane: u32::from(rim.is_pane()),
+                        unused: 0,
+                    })?;
                 }
             }
         }

@@ -9,7 +9,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::bridge::MendOptions;
-use crate::bridge::contacts::{Contact, LYING, ON_FACE};
+use crate::bridge::contacts::{Contact, GLAZED, LYING, ON_FACE};
 use crate::bridge::rims::{HELD, RimEdge};
 use crate::bridge::samples::samples_of;
 use crate::bridge::sheets::Sheets;
@@ -61,7 +61,7 @@ impl Measure {
     }
 }
 
-/// Shares of a rim edge, 0 to 1. 32 bytes.
+/// Shares of a rim edge, 0 to 1. 40 bytes.
 #[derive(Clone, Copy, Debug, Default, Pod, Zeroable)]
 #[repr(C)]
 pub struct Cover {
@@ -73,6 +73,8 @@ pub struct Cover {
     pub on_face: f64,
     /// It lies on a face.
     pub lying: f64,
+    /// A pane is beside it, and nothing else.
+    pub glazed: f64,
 }
 
 /// What becomes of a sheet.
@@ -155,6 +157,7 @@ impl<'d> Shells<'d> {
                     match contact.sheet {
                         ON_FACE => cover.on_face += share,
                         LYING => cover.lying += share,
+                        GLAZED => cover.glazed += share,
                         sheet => {
                             cover.faced += share;
                             nearest = nearest.min(contact.apart);

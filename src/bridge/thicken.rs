@@ -22,7 +22,7 @@ use crate::bridge::walls::Slab;
 use crate::bridge::{Added, Like, MendOptions};
 use crate::octree::points::is_owned;
 use crate::octree::{
-    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, SoupEdges, SoupTriangle,
+    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, Panes, SoupEdges, SoupTriangle,
     write_bins,
 };
 use crate::store::{Resources, Sorted, Sorter, Spool, StoreError, Table};
@@ -115,7 +115,7 @@ pub fn thicken(
         resources.monitor.note("too many triangles to thicken those that are thin");
         return Ok(None);
     }
-    let pairs = SoupEdges::find(soup, domain, resources)?.pairs;
+    let pairs = SoupEdges::find(soup, domain, Panes::Apart, resources)?.pairs;
     let mut sheets = Sheets::join(pairs, first, resources)?;
     let mut losses = Losses::new(lost, first, resources)?;
     let mut added = Added::new(domain, first, resources);

@@ -9,7 +9,7 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::octree::points::is_owned;
-use crate::octree::{BinnedSoup, BorderUse, Domain, SoupEdges, SoupTriangle};
+use crate::octree::{BinnedSoup, BorderUse, Domain, Panes, SoupEdges, SoupTriangle};
 use crate::store::{Labels, Record, Resources, Sorter, StoreError, Table, Unite};
 
 /// An open body and its part.
@@ -44,7 +44,7 @@ impl Bodies {
         resources: &Resources,
     ) -> Result<Self, StoreError> {
         let share_bytes = resources.share_bytes / 8;
-        let SoupEdges { pairs, borders } = SoupEdges::find(soup, domain, resources)?;
+        let SoupEdges { pairs, borders } = SoupEdges::find(soup, domain, Panes::Joined, resources)?;
         let mut bodies = Unite::new(resources.scratch, share_bytes, triangles)?;
         let mut sorted = pairs.finish()?;
         while let Some(pair) = sorted.next()? {

@@ -47,6 +47,8 @@ pub struct SoupStats {
     pub triangles: u64,
     /// Of these, dropped because a corner is NaN or infinite.
     pub nonfinite_triangles: u64,
+    /// Triangles that light passes.
+    pub transparent_triangles: u64,
     /// Faces that the reader left out.
     pub discarded: Discarded,
     /// Bytes of the input file that were read.
@@ -136,6 +138,7 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     let stats = SoupStats {
         triangles: writer.delivered,
         nonfinite_triangles: writer.delivered - writer.spool.len(),
+        transparent_triangles: writer.transparent,
         discarded: source.discarded(),
         input_bytes: source.bytes_read(),
     };
@@ -156,6 +159,7 @@ struct Writer<'r> {
     attributes: Option<SpoolWriter<AttributeRecord>>,
     bounds: SnapBox,
     delivered: u64,
+    transparent: u64,
     /// The last material that was asked for, and its number as triangles have it.
     last_material: Option<(u32, u32)>,
 }
@@ -168,6 +172,7 @@ impl<'r> Writer<'r> {
             attributes: None,
             bounds: SnapBox::EMPTY,
             delivered: 0,
+            transparent: 0,
             last_material: None,
         })
     }
@@ -199,6 +204,7 @@ impl<'r> Writer<'r> {
             let part = batch.parts[i];
             let triangle =
                 SoupTriangle { corners: *corners, source: number, part, material, stands_for: 0 };
+            self.transparent += u64::from(triangle.is_pane());
             self.spool.push(triangle)?;
         }
         Ok(())

@@ -44,6 +44,6 @@ pub use lost::LostHits;
 pub use occupancy::{InsideCorners, Occupancy};
 pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
-pub use soup_edges::{BorderUse, MOST_USES, SoupEdges, TrianglePair, each_border};
+pub use soup_edges::{BorderUse, MOST_USES, Panes, SoupEdges, TrianglePair, each_border};
 pub use touch::for_each_touched_brick;
 pub use triangle::{BinTriangle, DropRecord, SoupTriangle, TRANSPARENT};

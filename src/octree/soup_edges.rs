@@ -2,7 +2,8 @@
 //!
 //! In:      the bins of a soup; every triangle at an edge lies in the bin of the brick that holds
 //!          the edge's lower end.
-//! Out:     [`TrianglePair`]s on edges of two; [`BorderUse`]s of all other edges.
+//! Out:     [`TrianglePair`]s on edges of two; [`BorderUse`]s of all other edges, and of those
+//!          between panes and opaque triangles where panes are to be apart.
 //! Units:   lattice points; an edge is what two triangles have in common on the lattice.
 //! Memory:  the share.
 
@@ -42,13 +43,16 @@ pub struct BorderUse {
     /// The triangle.
     pub source: u32,
     /// The corner at which the edge begins, on the way around the triangle; plus
-    /// [`Self::BACKWARD`].
+    /// [`Self::BACKWARD`] and [`Self::PANE`].
     pub corner: u32,
 }
 
 impl BorderUse {
     /// Added to the corner where the triangle runs from the edge's upper end to its lower.
     pub const BACKWARD: u32 = 4;
+
+    /// Added to the corner where light passes the triangle.
+    pub const PANE: u32 = 8;
 
     /// Which of the triangle's corners the edge begins at.
     #[must_use]
@@ -62,6 +66,15 @@ impl Record for BorderUse {
     fn key(&self) -> Self::Key {
         (self.ends, self.source, self.corner)
     }
+}
+
+/// Whether transparent triangles are joined with others.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Panes {
+    /// Edges between them count as any.
+    Joined,
+    /// Edges of two, one of which is transparent, are borders of both.
+    Apart,
 }
 
 /// Edges of a soup on their way into sorts.
@@ -83,6 +96,7 @@ impl SoupEdges {
     pub fn find(
         soup: &BinnedSoup,
         domain: &Domain,
+        panes: Panes,
         resources: &Resources,
     ) -> Result<Self, StoreError> {
         let scratch = resources.scratch;
@@ -101,7 +115,7 @@ impl SoupEdges {
             },
             || {
                 let (pairs, borders) = (Outbox::new(&pairs), Outbox::new(&borders));
-                EdgeFinder { soup: *soup, domain, scratch, share_bytes, pairs, borders }
+                EdgeFinder { soup: *soup, domain, panes, scratch, share_bytes, pairs, borders }
             },
             |finder, bin| finder.find(&bin),
             |()| Ok(()),
@@ -115,6 +129,7 @@ impl SoupEdges {
 struct EdgeFinder<'f> {
     soup: BinnedSoup<'f>,
     domain: &'f Domain,
+    panes: Panes,
     scratch: &'f Scratch,
     share_bytes: u64,
     pairs: Outbox<'f, TrianglePair>,
@@ -134,7 +149,8 @@ impl EdgeFinder<'_> {
                 let (a, b) = (corners[i], corners[(i + 1) % 3]);
                 let ends = [a.min(b), a.max(b)];
                 if owner(domain, ends[0]) == bin.brick.0 {
-                    let corner = i as u32 + if a > b { BorderUse::BACKWARD } else { 0 };
+                    let pane = if triangle.is_pane() { BorderUse::PANE } else { 0 };
+                    let corner = i as u32 + if a > b { BorderUse::BACKWARD } else { 0 } + pane;
                     let (ends, source) = (pack_ends(ends), triangle.source);
                     uses.push(BorderUse { ends, source, corner })?;
                 }
@@ -158,10 +174,14 @@ impl EdgeFinder<'_> {
         self.borders.send()
     }
 
+    fn are_joined(&self, one: &BorderUse, other: &BorderUse) -> bool {
+        self.panes == Panes::Joined || (one.corner ^ other.corner) & BorderUse::PANE == 0
+    }
+
     /// Tells of an edge by its last uses, three of which stand for any number from three on.
     fn tell(&mut self, held: &mut Vec<BorderUse>) -> Result<(), StoreError> {
         match held[..] {
-            [one, other] => {
+            [one, other] if self.are_joined(&one, &other) => {
                 let turned = u32::from((one.corner ^ other.corner) & BorderUse::BACKWARD == 0);
                 let (one, other) = (one.source, other.source);
                 self.pairs.push(TrianglePair { one, other, turned })?;

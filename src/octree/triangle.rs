@@ -24,6 +24,14 @@ pub struct SoupTriangle {
     pub stands_for: u32,
 }
 
+impl SoupTriangle {
+    /// Whether light passes it.
+    #[must_use]
+    pub const fn is_pane(&self) -> bool {
+        self.material & TRANSPARENT != 0
+    }
+}
+
 /// A triangle in the bin of a brick that it touches. 96 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]

@@ -1,6 +1,6 @@
 //! The step that mends the soup before it is scanned.
 
-use crate::bridge::{HoleRule, MendOptions, mend};
+use crate::bridge::{HoleRule, Known, MendOptions, mend};
 use crate::ingest::{Bins, Settled};
 use crate::repair::RepairError;
 use crate::repair::length::Reach;
@@ -21,9 +21,14 @@ impl Run<'_> {
         let bins = Bins::open(resources, &files, findings.left_out)?;
         let settled = Settled::open(resources, &files, findings.settle)?;
         let soup = bins.without(&settled.drops);
-        let triangles = (findings.soup().stats.triangles, findings.settle.rim_edges);
+        let stats = &findings.soup().stats;
+        let known = Known {
+            triangles: stats.triangles,
+            rim_edges: findings.settle.rim_edges,
+            has_panes: findings.has_panes(),
+        };
         let options = self.mend_options(findings)?;
-        let (mended, stats) = mend(&soup, &options, findings.domain(), triangles, resources)?;
+        let (mended, stats) = mend(&soup, &options, findings.domain(), known, resources)?;
         findings.mend = stats;
         Ok(mended.files())
     }

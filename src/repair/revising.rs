@@ -156,7 +156,8 @@ impl Run<'_> {
         findings.patch = stats;
         let rule = self.settings.fill_rule;
         let (flooded, stats) =
-            flood(&hits, &flips, rule, &domain, resources).map_err(RepairError::Sign)?;
+            flood(&hits, &flips, (rule, findings.has_panes()), &domain, resources)
+                .map_err(RepairError::Sign)?;
         findings.flood = stats;
         let mut files = hand_on(hits, &mut handles.hits);
         files.push(flips.state().clone());

@@ -82,6 +82,11 @@ impl Findings {
         self.soup.as_ref().expect("the input is read first")
     }
 
+    /// Whether light passes triangles of the input.
+    pub fn has_panes(&self) -> bool {
+        self.soup().stats.transparent_triangles > 0
+    }
+
     /// The grid.
     pub fn domain(&self) -> &Domain {
         self.domain.as_ref().expect("the grid is laid when the input was read")
@@ -379,8 +384,9 @@ impl Run<'_> {
         let options = ReadOptions { share_bytes: resources.share_bytes / 4 };
         let mut open = || crate::io::open(workspace.part(), resources.scratch, &options);
         let outward = match self.settings.fill_rule {
-            FillRule::Solid => Outward::AllPositive,
-            FillRule::Nonzero | FillRule::Evenodd => Outward::AlternatesWithNesting,
+            // What lies behind panes is a hollow.
+            FillRule::Solid if !findings.has_panes() => Outward::AllPositive,
+            _ => Outward::AlternatesWithNesting,
         };
         let proof_options =
             ProofOptions { share_bytes: resources.share_bytes / 2, outward, intersections: true };
@@ -444,7 +450,8 @@ fn flood_bricks(
     let flips = Flips::open(resources, &workspace.files())?;
     let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
     let (flooded, stats) =
-        flood(hits, &flips, rule, findings.domain(), resources).map_err(RepairError::Sign)?;
+        flood(hits, &flips, (rule, findings.has_panes()), findings.domain(), resources)
+            .map_err(RepairError::Sign)?;
     findings.flood = stats;
     Ok(flooded.files())
 }

@@ -9,12 +9,13 @@ use crate::hidden;
 use crate::io::FACES;
 use crate::mesh::SinkFile;
 use crate::repair::step::{OUTPUT_PART, Step};
+use crate::sign;
 use crate::store::Manifest;
 
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 13] = [
+pub const PASSING: [&str; 15] = [
     "facts.spool",
     bridge::PASSING[0],
     bridge::PASSING[1],
@@ -24,7 +25,9 @@ pub const PASSING: [&str; 13] = [
     hidden::SEEN[1],
     hidden::SEEN[2],
     "faces.spool",
-    "even.spool",
+    sign::PASSING[0],
+    sign::PASSING[1],
+    sign::PASSING[2],
     FACES,
     LOOKS[0],
     LOOKS[1],

@@ -9,7 +9,7 @@ use crate::octree::{
     LOST, Occupancy, Regions, SIDE, SourcePlane, Touched, decode_hits, edge_position, find_regions,
 };
 use crate::sign::SignError;
-use crate::sign::flooded::{Flooded, OUTSIDE};
+use crate::sign::flooded::{Flooded, OUTSIDE, PANE};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::store::{BrickFile, Resources, Sorter, StoreError, ordered_by_weight};
 
@@ -69,7 +69,10 @@ pub fn find_exposed(
             let is_outside = |region: u16| known[usize::from(region)] & OUTSIDE != 0;
             let mut says = BrickSays {
                 key: item.brick.0,
-                corners: inside_corners(&regions, is_outside),
+                // Rays pass panes.
+                corners: inside_corners(&regions, |region| {
+                    known[usize::from(region)] & (OUTSIDE | PANE) != 0
+                }),
                 places: Vec::new(),
                 touched: Vec::new(),
             };
@@ -98,19 +101,19 @@ pub fn find_exposed(
     Ok(Exposed { places, touched, occupancy: Occupancy::new(keys, corners, domain) })
 }
 
-/// The corners that the brick owns and the outside does not reach.
-fn inside_corners(regions: &Regions, is_outside: impl Fn(u16) -> bool) -> Box<InsideCorners> {
+/// The corners that the brick owns and rays do not pass.
+fn inside_corners(regions: &Regions, is_passed: impl Fn(u16) -> bool) -> Box<InsideCorners> {
     let mut corners = Box::<InsideCorners>::default();
     for z in 0..SIDE {
         for y in 0..SIDE {
-            let runs = regions.row(z * LINES + y).filter(|(_, region)| !is_outside(*region));
+            let runs = regions.row(z * LINES + y).filter(|(_, region)| !is_passed(*region));
             corners.set_row([y, z], runs.fold(0, |row, (bits, _)| row | bits));
         }
     }
     for axis in 0..3 {
         let mut beyond = [0; 3];
         beyond[axis] = SIDE;
-        if !is_outside(regions.at(beyond)) {
+        if !is_passed(regions.at(beyond)) {
             corners.set_beyond(axis);
         }
     }

@@ -37,6 +37,9 @@ pub const WOUND: u8 = 4;
 /// In a record of a region: no votes tell its winding number.
 pub const UNTOLD: u8 = 8;
 
+/// In a record of a region: the outside reaches it past panes, and it is inside of one.
+pub const PANE: u8 = 16;
+
 /// What the outside reaches.
 pub struct Flooded {
     bricks: Spool<FloodedBrick>,
@@ -44,15 +47,18 @@ pub struct Flooded {
 }
 
 impl Flooded {
-    /// Writes down what the flood found.
+    /// Writes down what the flood found. Past panes the outside reaches what is outside by parity;
+    /// what is inside there is the pane itself.
     pub(crate) fn write(
         bricks: &[GraphBrick],
         parities: &[bool],
+        odd_regions: Option<&Spool<u8>>,
         mut exterior: Exterior,
         resources: &Resources,
     ) -> Result<Self, SignError> {
         let mut records = SpoolWriter::create(resources.scratch, FLOODED)?;
         let mut regions = SpoolWriter::create(resources.scratch, REGIONS)?;
+        let mut odd = odd_regions.map(SpoolPeek::new);
         for (brick, &inside) in bricks.iter().zip(parities) {
             if resources.monitor.cancelled() {
                 return Err(StoreError::Cancelled.into());
@@ -60,11 +66,17 @@ impl Flooded {
             let (count, base_inside) = (u32::from(brick.regions), u32::from(inside));
             records.push(FloodedBrick { key: brick.key, regions: count, base_inside })?;
             for region in brick.first_region..brick.first_region + count {
-                let outside = exterior.reaches(region)?;
+                let is_odd = match &mut odd {
+                    Some(odd) => odd.next()? == Some(1),
+                    None => false,
+                };
+                let past_panes = odd.is_some() && exterior.reaches_past_panes(region)?;
+                let outside = exterior.reaches(region)? || past_panes && is_odd == inside;
+                let pane = if past_panes && !outside { PANE } else { 0 };
                 let sealed = !outside && exterior.reaches_past_even(region)?;
                 let bits = if outside { OUTSIDE } else { 0 };
                 let bits = bits | if sealed { SEALED_BY_RESOLUTION } else { 0 };
-                regions.push(bits | exterior.winding_bits(region, outside)?)?;
+                regions.push(pane | bits | exterior.winding_bits(region, outside)?)?;
             }
         }
         Ok(Self { bricks: records.finish()?, regions: regions.finish()? })

@@ -14,6 +14,7 @@ use crate::octree::{
 };
 use crate::sign::flooded::{UNTOLD, WOUND};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
+use crate::sign::panes::PanesSay;
 use crate::sign::winding::{VoteStats, Votes, Windings};
 use crate::sign::{FillRule, SignError};
 use crate::store::{
@@ -66,8 +67,21 @@ pub struct RegionGraph {
     even: Option<Spool<[u32; 2]>>,
     /// What hits say about winding numbers, where that is asked.
     votes: Option<Sorter<Votes>>,
+    /// What there is of panes, where there are any.
+    panes: Option<PaneGraph>,
     regions: u64,
 }
+
+/// What panes join.
+pub struct PaneGraph {
+    /// Pairs of regions joined by an edge that only panes hit.
+    pairs: Spool<[u32; 2]>,
+    /// Of every region 1 where its parity is not that of its brick's min corner.
+    pub odd: Spool<u8>,
+}
+
+/// Spools that live within the flood.
+pub const PASSING: [&str; 3] = ["even.spool", "panes.spool", "odd.spool"];
 
 /// Whether a region is reached from outside.
 pub struct Exterior {
@@ -75,6 +89,9 @@ pub struct Exterior {
     strict_outside: u32,
     loose: Labels,
     loose_outside: u32,
+    /// Reached past panes too, where there are any.
+    past_panes: Option<Labels>,
+    outside: u32,
     windings: Option<Windings>,
 }
 
@@ -116,6 +133,12 @@ impl Exterior {
         Ok(self.strict.label(region)? == self.strict_outside)
     }
 
+    /// Reached past edges that only panes hit.
+    pub fn reaches_past_panes(&mut self, region: u32) -> Result<bool, StoreError> {
+        let Some(labels) = &mut self.past_panes else { return self.reaches(region) };
+        Ok(labels.label(region)? == labels.label(self.outside)?)
+    }
+
     /// Reached past edges with an even number of hits.
     pub fn reaches_past_even(&mut self, region: u32) -> Result<bool, StoreError> {
         Ok(self.loose.label(region)? == self.loose_outside)
@@ -131,19 +154,23 @@ struct BrickSays {
     even: Vec<[u16; 2]>,
     /// Regions at the lower and the upper end of edges, the change, and how many edges say so.
     votes: Vec<([u16; 2], i16, u32)>,
+    /// Pairs of regions that only panes are between, and which regions are odd.
+    panes: PanesSay,
 }
 
 /// Finds the regions of all bricks.
 pub fn build_graph(
     hits: &BrickFile,
     flips: &Flips,
-    rule: FillRule,
+    (rule, has_panes): (FillRule, bool),
     resources: &Resources,
 ) -> Result<RegionGraph, SignError> {
     let mut items = LoadItems::new(hits, flips, resources);
     let mut bricks = Vec::with_capacity(hits.len());
     let mut pieces = Sorter::<FacePiece>::new(resources.scratch, resources.share_bytes / 4);
-    let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, "even.spool")?;
+    let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, PASSING[0])?;
+    let mut pane_pairs = SpoolWriter::<[u32; 2]>::create(resources.scratch, PASSING[1])?;
+    let mut odd = SpoolWriter::<u8>::create(resources.scratch, PASSING[2])?;
     let mut votes = Sorter::<Votes>::new(resources.scratch, resources.share_bytes / 8);
     let mut regions = 0_u64;
     let resident = Resident::new(Gauge::ResidentBricks, resources.monitor);
@@ -156,8 +183,12 @@ pub fn build_graph(
             let _brick = resident.hold(1);
             let view = loaded.load(hits, &item)?;
             let mut says = examine(loaded, item.brick);
-            if let (FillRule::Nonzero, Some(view)) = (rule, view) {
-                says.votes = votes_of(decode_hits(&view)?, loaded, &item.flips);
+            let record = view.as_ref().map(|view| decode_hits(view)).transpose()?;
+            if let (FillRule::Nonzero, Some(record)) = (rule, record) {
+                says.votes = votes_of(record, loaded, &item.flips);
+            }
+            if has_panes {
+                says.panes = PanesSay::of(record, loaded, &item.flips);
             }
             Ok(says)
         },
@@ -168,6 +199,10 @@ pub fn build_graph(
             for pair in &says.even {
                 even.push(pair.map(|region| base + u32::from(region)))?;
             }
+            for pair in &says.panes.pairs {
+                pane_pairs.push(pair.map(|region| base + u32::from(region)))?;
+            }
+            says.panes.odd.iter().try_for_each(|&is_odd| odd.push(is_odd.into()))?;
             for &(regions, delta, count) in &says.votes {
                 let [a, b] = regions.map(|region| base + u32::from(region));
                 votes.push(Votes { a, b, delta: delta.into(), count })?;
@@ -186,7 +221,9 @@ pub fn build_graph(
     )?;
     let even = Some(even.finish()?);
     let votes = (rule == FillRule::Nonzero).then_some(votes);
-    Ok(RegionGraph { bricks, pieces, even, votes, regions })
+    let panes = PaneGraph { pairs: pane_pairs.finish()?, odd: odd.finish()? };
+    let panes = has_panes.then_some(panes);
+    Ok(RegionGraph { bricks, pieces, even, votes, panes, regions })
 }
 
 fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
@@ -200,6 +237,7 @@ fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
         sides,
         even: even_pairs(loaded, &regions),
         votes: Vec::new(),
+        panes: PanesSay::default(),
     }
 }
 
@@ -272,6 +310,11 @@ fn push_sides(
 }
 
 impl RegionGraph {
+    /// Which regions are odd, where there are panes.
+    pub fn odd_regions(&self) -> Option<&Spool<u8>> {
+        self.panes.as_ref().map(|panes| &panes.odd)
+    }
+
     /// The number of regions.
     pub fn region_count(&self) -> u64 {
         self.regions
@@ -289,8 +332,13 @@ impl RegionGraph {
         let mut loose = Unite::new(resources.scratch, share, outside + 1)?;
         let outside = outside as u32;
         let first_empty = self.regions as u32;
+        let mut past_panes = match &self.panes {
+            Some(_) => Some(Unite::new(resources.scratch, share, u64::from(outside) + 1)?),
+            None => None,
+        };
         let mut join = |a: u32, b: u32| -> Result<(), StoreError> {
             strict.unite(a, b)?;
+            past_panes.as_mut().map_or(Ok(()), |labels| labels.unite(a, b))?;
             loose.unite(a, b)
         };
         let none = Sorter::new(resources.scratch, 0);
@@ -306,6 +354,13 @@ impl RegionGraph {
                 block.iter().try_for_each(|&[a, b]| loose.unite(a, b))?;
             }
         }
+        if let (Some(panes), Some(labels)) = (&self.panes, &mut past_panes) {
+            let mut reader = panes.pairs.reader(0, panes.pairs.len());
+            while let Some(block) = reader.next_block()? {
+                block.iter().try_for_each(|&[a, b]| labels.unite(a, b))?;
+            }
+        }
+        let past_panes = past_panes.map(Unite::finish).transpose()?;
         let (mut strict, mut loose) = (strict.finish()?, loose.finish()?);
         let strict_outside = strict.label(outside)?;
         let loose_outside = loose.label(outside)?;
@@ -317,7 +372,7 @@ impl RegionGraph {
             }
             None => None,
         };
-        Ok(Exterior { strict, strict_outside, loose, loose_outside, windings })
+        Ok(Exterior { strict, strict_outside, loose, loose_outside, past_panes, outside, windings })
     }
 }
 

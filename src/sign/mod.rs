@@ -14,6 +14,7 @@ mod exposed;
 mod flooded;
 mod graph;
 mod load;
+mod panes;
 mod parity;
 mod relabel;
 mod thin;
@@ -31,6 +32,7 @@ use crate::store::{BrickFile, Resources, StoreError};
 
 pub use exposed::{Exposed, find_exposed};
 pub use flooded::{FLOODED, Flooded, FloodedBrick, REGIONS};
+pub use graph::PASSING;
 pub use thin::find_lost;
 pub use winding::VoteStats;
 
@@ -129,18 +131,20 @@ impl SignError {
     }
 }
 
-/// Finds what the outside reaches, and with [`FillRule::Nonzero`] the winding numbers.
+/// Finds what the outside reaches, and with [`FillRule::Nonzero`] the winding numbers. With
+/// [`FillRule::Solid`] the outside goes on behind panes, where the soup has any.
 ///
 /// # Errors
 /// [`SignError`].
 pub fn flood(
     hits: &BrickFile,
     flips: &Flips,
-    rule: FillRule,
+    (rule, has_panes): (FillRule, bool),
     domain: &Domain,
     resources: &Resources,
 ) -> Result<(Flooded, FloodStats), SignError> {
-    let mut graph = build_graph(hits, flips, rule, resources)?;
+    let mut graph =
+        build_graph(hits, flips, (rule, has_panes && rule == FillRule::Solid), resources)?;
     let keys = graph.bricks.iter().map(|brick| brick.key).collect();
     let index = BrickIndex::new(keys, domain.bricks_per_side());
     let mut exterior = graph.flood(&index, resources)?;
@@ -151,7 +155,8 @@ pub fn flood(
         let note = "triangles contradict each other in where is inside: filled as solid";
         resources.monitor.note(note);
     }
-    let flooded = Flooded::write(&graph.bricks, &parities, exterior, resources)?;
+    let flooded =
+        Flooded::write(&graph.bricks, &parities, graph.odd_regions(), exterior, resources)?;
     Ok((flooded, FloodStats { closed_volumes, votes }))
 }
 

@@ -22,7 +22,7 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::bins::Bins;
 use crate::ingest::duplicates::{DROPS, SettleStats, Settled};
 use crate::ingest::fins::parts::Parts;
-use crate::octree::{BinnedSoup, Domain, DropRecord, SoupEdges, TrianglePair};
+use crate::octree::{BinnedSoup, Domain, DropRecord, Panes, SoupEdges, TrianglePair};
 use crate::store::{Resources, Sorter, SpoolWriter, StoreError, Unite};
 
 /// What becomes of sheets without thickness.
@@ -69,7 +69,7 @@ pub fn drop_fins(
     }
     let share = resources.share_bytes / 4;
     let soup = bins.without(&settled.drops);
-    let SoupEdges { pairs, borders } = SoupEdges::find(&soup, domain, resources)?;
+    let SoupEdges { pairs, borders } = SoupEdges::find(&soup, domain, Panes::Joined, resources)?;
     let mut sheets = Unite::new(resources.scratch, share, triangles)?;
     let mut sorted = pairs.finish()?;
     while let Some(TrianglePair { one, other, .. }) = sorted.next()? {
