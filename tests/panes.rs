@@ -121,3 +121,23 @@ fn a_box_without_thickness_behind_a_pane_gets_walls() {
     let (_, surface) = repair_with_panes(&soup, &pane, 1.0, &at_depth(7));
     assert!((surface.proof.volume - 1.0).abs() < 2e-3, "{}", surface.proof.volume);
 }
+
+#[test]
+fn a_pane_thinner_than_a_cell_is_thickened_whole() {
+    let soup = [oven(), content()].concat();
+    let mut thickened = 0;
+    for step in 0..5 {
+        // Where no corner of the grid lies in it, both of its sides get slabs, which overlap.
+        let lo = 0.8 + 0.002 * f64::from(step);
+        let pane = cuboid([WALL, WALL, lo], [1.0 - WALL, 1.0 - WALL, lo + 0.005]);
+        let (outcome, surface) = repair_with_panes(&soup, &pane, 0.3, &at_depth(7));
+        let glass = surface.proof.volume - WALLS_VOLUME - CONTENT_VOLUME;
+        let cells = glass / (0.64 * outcome.cell_size);
+        let is_thick = outcome.thickened.triangles > 0;
+        let expected = if is_thick { 1.5..3.2 } else { 0.5..0.7 };
+        assert!(expected.contains(&cells), "{lo}: {cells} cells of glass");
+        assert_eq!(outcome.hidden.hidden_bodies + outcome.hidden.sealed_bodies, 0);
+        thickened += u32::from(is_thick);
+    }
+    assert!((1..5).contains(&thickened), "{thickened}");
+}

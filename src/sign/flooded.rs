@@ -70,9 +70,10 @@ impl Flooded {
                     Some(odd) => odd.next()? == Some(1),
                     None => false,
                 };
-                let past_panes = odd.is_some() && exterior.reaches_past_panes(region)?;
-                let outside = exterior.reaches(region)? || past_panes && is_odd == inside;
-                let pane = if past_panes && !outside { PANE } else { 0 };
+                let past_panes = exterior.reaches_past_panes(region)?;
+                let is_behind = past_panes == Some(true) && is_odd == inside;
+                let outside = exterior.reaches(region)? || is_behind;
+                let pane = if past_panes.is_some() && !outside { PANE } else { 0 };
                 let sealed = !outside && exterior.reaches_past_even(region)?;
                 let bits = if outside { OUTSIDE } else { 0 };
                 let bits = bits | if sealed { SEALED_BY_RESOLUTION } else { 0 };

@@ -69,6 +69,7 @@ pub struct RegionGraph {
     votes: Option<Sorter<Votes>>,
     /// What there is of panes, where there are any.
     panes: Option<PaneGraph>,
+    odd_regions: Option<Spool<u8>>,
     regions: u64,
 }
 
@@ -76,8 +77,10 @@ pub struct RegionGraph {
 pub struct PaneGraph {
     /// Pairs of regions joined by an edge that only panes hit.
     pairs: Spool<[u32; 2]>,
+    /// What these edges say about winding numbers.
+    votes: Sorter<Votes>,
     /// Of every region 1 where its parity is not that of its brick's min corner.
-    pub odd: Spool<u8>,
+    odd: Spool<u8>,
 }
 
 /// Spools that live within the flood.
@@ -90,9 +93,16 @@ pub struct Exterior {
     loose: Labels,
     loose_outside: u32,
     /// Reached past panes too, where there are any.
-    past_panes: Option<Labels>,
-    outside: u32,
+    past_panes: Option<PastPanes>,
     windings: Option<Windings>,
+}
+
+/// What is reached past panes.
+struct PastPanes {
+    labels: Labels,
+    outside: u32,
+    /// Winding numbers by panes alone.
+    windings: Windings,
 }
 
 impl Exterior {
@@ -133,10 +143,15 @@ impl Exterior {
         Ok(self.strict.label(region)? == self.strict_outside)
     }
 
-    /// Reached past edges that only panes hit.
-    pub fn reaches_past_panes(&mut self, region: u32) -> Result<bool, StoreError> {
-        let Some(labels) = &mut self.past_panes else { return self.reaches(region) };
-        Ok(labels.label(region)? == labels.label(self.outside)?)
+    /// Past edges that only panes hit, `None` where it is not reached so, else whether the winding
+    /// number of panes is zero, or unknown.
+    pub fn reaches_past_panes(&mut self, region: u32) -> Result<Option<bool>, StoreError> {
+        let Some(past) = &mut self.past_panes else { return Ok(None) };
+        if past.labels.label(region)? != past.outside {
+            return Ok(None);
+        }
+        let number = past.windings.of(self.strict.label(region)?)?;
+        Ok(Some(number.unwrap_or(0) == 0))
     }
 
     /// Reached past edges with an even number of hits.
@@ -170,6 +185,7 @@ pub fn build_graph(
     let mut pieces = Sorter::<FacePiece>::new(resources.scratch, resources.share_bytes / 4);
     let mut even = SpoolWriter::<[u32; 2]>::create(resources.scratch, PASSING[0])?;
     let mut pane_pairs = SpoolWriter::<[u32; 2]>::create(resources.scratch, PASSING[1])?;
+    let mut pane_votes = Sorter::<Votes>::new(resources.scratch, resources.share_bytes / 16);
     let mut odd = SpoolWriter::<u8>::create(resources.scratch, PASSING[2])?;
     let mut votes = Sorter::<Votes>::new(resources.scratch, resources.share_bytes / 8);
     let mut regions = 0_u64;
@@ -199,8 +215,10 @@ pub fn build_graph(
             for pair in &says.even {
                 even.push(pair.map(|region| base + u32::from(region)))?;
             }
-            for pair in &says.panes.pairs {
-                pane_pairs.push(pair.map(|region| base + u32::from(region)))?;
+            for &(regions, delta, count) in &says.panes.votes {
+                let [a, b] = regions.map(|region| base + u32::from(region));
+                pane_pairs.push([a, b])?;
+                pane_votes.push(Votes { a, b, delta: delta.into(), count })?;
             }
             says.panes.odd.iter().try_for_each(|&is_odd| odd.push(is_odd.into()))?;
             for &(regions, delta, count) in &says.votes {
@@ -221,9 +239,9 @@ pub fn build_graph(
     )?;
     let even = Some(even.finish()?);
     let votes = (rule == FillRule::Nonzero).then_some(votes);
-    let panes = PaneGraph { pairs: pane_pairs.finish()?, odd: odd.finish()? };
+    let panes = PaneGraph { pairs: pane_pairs.finish()?, votes: pane_votes, odd: odd.finish()? };
     let panes = has_panes.then_some(panes);
-    Ok(RegionGraph { bricks, pieces, even, votes, panes, regions })
+    Ok(RegionGraph { bricks, pieces, even, votes, panes, odd_regions: None, regions })
 }
 
 fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
@@ -310,9 +328,9 @@ fn push_sides(
 }
 
 impl RegionGraph {
-    /// Which regions are odd, where there are panes.
+    /// Which regions are odd, where there are panes and the flood is done.
     pub fn odd_regions(&self) -> Option<&Spool<u8>> {
-        self.panes.as_ref().map(|panes| &panes.odd)
+        self.odd_regions.as_ref()
     }
 
     /// The number of regions.
@@ -360,7 +378,6 @@ impl RegionGraph {
                 block.iter().try_for_each(|&[a, b]| labels.unite(a, b))?;
             }
         }
-        let past_panes = past_panes.map(Unite::finish).transpose()?;
         let (mut strict, mut loose) = (strict.finish()?, loose.finish()?);
         let strict_outside = strict.label(outside)?;
         let loose_outside = loose.label(outside)?;
@@ -372,7 +389,18 @@ impl RegionGraph {
             }
             None => None,
         };
-        Ok(Exterior { strict, strict_outside, loose, loose_outside, past_panes, outside, windings })
+        let past_panes = match (self.panes.take(), past_panes) {
+            (Some(panes), Some(labels)) => {
+                let votes = relabelled(panes.votes, &mut strict, resources)?;
+                let regions = u64::from(outside) + 1;
+                let windings = Windings::count(votes, regions, strict_outside, resources)?;
+                self.odd_regions = Some(panes.odd);
+                let mut labels = labels.finish()?;
+                Some(PastPanes { outside: labels.label(outside)?, labels, windings })
+            }
+            _ => None,
+        };
+        Ok(Exterior { strict, strict_outside, loose, loose_outside, past_panes, windings })
     }
 }
 

@@ -1,8 +1,11 @@
 //! What a brick says of panes, which the outside goes on behind.
 //!
 //! Past an edge that only panes hit, one looks: the region beyond is reached, though not by the
-//! surface alone. What is reached so is outside if parity calls it outside, else it is the inside
-//! of a pane.
+//! surface alone. What is reached so is outside if parity calls it so, and the winding number of
+//! panes alone is zero: where two of them overlap, parity is even as well. Else it is the inside of
+//! a pane. Slabs of ours face outward, so the number tells of them whatever the input faces.
+
+use std::collections::BTreeMap;
 
 use crate::octree::{
     ArchivedHitBrick, CornerBits, FlipRecord, HitEdge, ROWS, SourcePlane, TRANSPARENT,
@@ -13,8 +16,9 @@ use crate::sign::load::Loaded;
 /// See the module. Regions are those of the brick.
 #[derive(Clone, Debug, Default)]
 pub struct PanesSay {
-    /// Pairs of regions on both sides of an edge that only panes hit.
-    pub pairs: Vec<[u16; 2]>,
+    /// Regions at the lower and the upper end of edges that only panes hit, by how much the winding
+    /// number changes from one to the other, and how many edges say so.
+    pub votes: Vec<([u16; 2], i16, u32)>,
     /// Of every region whether its parity is not that of the min corner.
     pub odd: Vec<bool>,
 }
@@ -32,12 +36,13 @@ impl PanesSay {
                 odd[usize::from(region)] = parity.rows[row] & bits != 0;
             }
         }
-        let Some(record) = record else { return Self { pairs: Vec::new(), odd } };
+        let Some(record) = record else { return Self { votes: Vec::new(), odd } };
         let mut flips = flips.iter().peekable();
-        let mut pairs = Vec::new();
+        let mut votes: BTreeMap<([u16; 2], i16), u32> = BTreeMap::new();
         let mut first = 0;
         for edge in record.edges.iter() {
-            let edge = HitEdge { bits: edge.bits.to_native(), signed_sum: 0 };
+            let signed_sum = edge.signed_sum.to_native();
+            let edge = HitEdge { bits: edge.bits.to_native(), signed_sum };
             let hits = &record.hits[first..first + edge.kept()];
             first += edge.kept();
             while flips.next_if(|flip| flip.edge < edge.edge()).is_some() {}
@@ -52,13 +57,12 @@ impl PanesSay {
             let (axis, at) = edge_position(edge.edge());
             let mut beyond = at;
             beyond[axis] += 1;
-            let (a, b) = (regions.at(at), regions.at(beyond));
-            if a != b {
-                pairs.push([a.min(b), a.max(b)]);
+            let ends = [regions.at(at), regions.at(beyond)];
+            if ends[0] != ends[1] {
+                *votes.entry((ends, -signed_sum)).or_default() += 1;
             }
         }
-        pairs.sort_unstable();
-        pairs.dedup();
-        Self { pairs, odd }
+        let votes = votes.into_iter().map(|((ends, delta), count)| (ends, delta, count));
+        Self { votes: votes.collect(), odd }
     }
 }
