@@ -103,7 +103,8 @@ impl Workshop {
     ) -> (BrickFile, SignStats) {
         let resources = self.resources();
         let rule = FillRule::Solid;
-        let (flooded, _) = flood(hits, flips, rule, &model.domain, &resources).expect("sign works");
+        let (flooded, _) =
+            flood(hits, flips, (rule, false), &model.domain, &resources).expect("sign works");
         assign_signs(hits, flips, &flooded, rule, &resources).expect("sign works")
     }
 
