@@ -12,7 +12,7 @@
 //! Invariant:  whole bodies go or stay; the answer does not depend on any share or thread.
 //! Units:      cells for rays, model units for sizes.
 //! Memory:     the share; tables over triangles spill.
-//! Fails:      [`StoreError`].
+//! Fails:      [`crate::store::StoreError`].
 //! Source:     Nooruddin, Turk 2003, section 4 (visibility of parts); sampling and the bound of
 //!             Wilson 1927 are ours to combine.
 
