@@ -7,7 +7,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::sign::SignError;
-use crate::sign::graph::{Exterior, GraphBrick};
+use crate::sign::exterior::Exterior;
+use crate::sign::graph::GraphBrick;
 use crate::store::{FileState, Resources, Spool, SpoolPeek, SpoolWriter, StoreError};
 
 /// Spool of the bricks.

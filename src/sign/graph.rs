@@ -12,14 +12,13 @@ use crate::octree::{
     ArchivedHitBrick, BrickIndex, BrickKey, FaceRegions, FlipRecord, Flips, HitEdge, Neighbour,
     Regions, SIDE, decode_hits, edge_position, find_regions,
 };
-use crate::sign::flooded::{UNTOLD, WOUND};
+use crate::sign::exterior::{Exterior, PastPanes, relabelled};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::panes::PanesSay;
-use crate::sign::winding::{VoteStats, Votes, Windings};
+use crate::sign::winding::{Votes, Windings};
 use crate::sign::{FillRule, SignError};
 use crate::store::{
-    BrickFile, Labels, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite,
-    ordered_by_weight,
+    BrickFile, Record, Resources, Sorter, Spool, SpoolWriter, StoreError, Unite, ordered_by_weight,
 };
 
 /// A brick of the graph. 16 bytes.
@@ -85,80 +84,6 @@ pub struct PaneGraph {
 
 /// Spools that live within the flood.
 pub const PASSING: [&str; 3] = ["even.spool", "panes.spool", "odd.spool"];
-
-/// Whether a region is reached from outside.
-pub struct Exterior {
-    strict: Labels,
-    strict_outside: u32,
-    loose: Labels,
-    loose_outside: u32,
-    /// Reached past panes too, where there are any.
-    past_panes: Option<PastPanes>,
-    windings: Option<Windings>,
-}
-
-/// What is reached past panes.
-struct PastPanes {
-    labels: Labels,
-    outside: u32,
-    /// Winding numbers by panes alone.
-    windings: Windings,
-}
-
-impl Exterior {
-    /// What the votes came to.
-    pub fn vote_stats(&self) -> VoteStats {
-        self.windings.as_ref().map_or_else(VoteStats::default, |windings| windings.stats)
-    }
-
-    /// What the winding number of a region says in its record.
-    pub fn winding_bits(&mut self, region: u32, is_outside: bool) -> Result<u8, StoreError> {
-        let Some(windings) = &mut self.windings else { return Ok(0) };
-        if is_outside {
-            return Ok(0);
-        }
-        if windings.stats.fell_back {
-            return Ok(WOUND);
-        }
-        Ok(match windings.of(self.strict.label(region)?)? {
-            Some(0) => 0,
-            Some(_) => WOUND,
-            None => UNTOLD,
-        })
-    }
-
-    /// How many sets of the first `regions` regions the outside does not reach.
-    pub fn closed_volumes(&mut self, regions: u64) -> Result<u64, StoreError> {
-        let mut volumes = 0;
-        // A set is told of by its smallest member, and empty space comes after all regions.
-        for region in 0..regions as u32 {
-            let label = self.strict.label(region)?;
-            volumes += u64::from(label == region && label != self.strict_outside);
-        }
-        Ok(volumes)
-    }
-
-    /// Reached past no hit at all.
-    pub fn reaches(&mut self, region: u32) -> Result<bool, StoreError> {
-        Ok(self.strict.label(region)? == self.strict_outside)
-    }
-
-    /// Past edges that only panes hit, `None` where it is not reached so, else whether the winding
-    /// number of panes is zero, or unknown.
-    pub fn reaches_past_panes(&mut self, region: u32) -> Result<Option<bool>, StoreError> {
-        let Some(past) = &mut self.past_panes else { return Ok(None) };
-        if past.labels.label(region)? != past.outside {
-            return Ok(None);
-        }
-        let number = past.windings.of(self.strict.label(region)?)?;
-        Ok(Some(number.unwrap_or(0) == 0))
-    }
-
-    /// Reached past edges with an even number of hits.
-    pub fn reaches_past_even(&mut self, region: u32) -> Result<bool, StoreError> {
-        Ok(self.loose.label(region)? == self.loose_outside)
-    }
-}
 
 /// What one brick says.
 struct BrickSays {
@@ -345,7 +270,8 @@ impl RegionGraph {
         resources: &Resources,
     ) -> Result<Exterior, SignError> {
         let outside = self.regions + index.empty_count() as u64;
-        let share = resources.share_bytes / 4;
+        // Panes need a union and winding numbers of their own.
+        let share = resources.share_bytes / if self.panes.is_some() { 8 } else { 4 };
         let mut strict = Unite::new(resources.scratch, share, outside + 1)?;
         let mut loose = Unite::new(resources.scratch, share, outside + 1)?;
         let outside = outside as u32;
@@ -402,21 +328,6 @@ impl RegionGraph {
         };
         Ok(Exterior { strict, strict_outside, loose, loose_outside, past_panes, windings })
     }
-}
-
-/// The votes between what regions of all bricks were united to.
-fn relabelled(
-    votes: Sorter<Votes>,
-    labels: &mut Labels,
-    resources: &Resources,
-) -> Result<Sorter<Votes>, StoreError> {
-    let mut between = Sorter::new(resources.scratch, resources.share_bytes / 8);
-    let mut sorted = votes.finish()?;
-    while let Some(Votes { a, b, delta, count }) = sorted.next()? {
-        let (a, b) = (labels.label(a)?, labels.label(b)?);
-        between.push(Votes { a, b, delta, count }.ordered())?;
-    }
-    Ok(between)
 }
 
 /// Joins what the two sides of every face say, or one side and the empty space beyond.

@@ -11,6 +11,7 @@
 //! Source:     Ju 2004, section 5 (sign generation); the region graph and its barrier are ours.
 
 mod exposed;
+mod exterior;
 mod flooded;
 mod graph;
 mod load;
