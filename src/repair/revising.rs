@@ -8,7 +8,7 @@ use crate::bridge::{Mended, ThickenStats, Thickened, thicken};
 use crate::hidden::{Bodies, HiddenStats, Seen, judge, leave_out};
 use crate::ingest::{Bins, names_of_parts};
 use crate::monitor::Monitor;
-use crate::octree::{BinSpools, BinnedSoup, Flips};
+use crate::octree::{BinnedSoup, Flips};
 use crate::patch::patch;
 use crate::repair::RepairError;
 use crate::repair::deeper::{DepthTrial, goes_deeper};
@@ -60,8 +60,7 @@ impl Run<'_> {
         let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
         let seen = self.hide(&soup, hits, &scanned, findings, &files, resources)?;
         if let Some(seen) = &seen {
-            let bins: BinSpools = bins.spools();
-            scanned = self.scan_again(&seen.soup(bins), findings, handles, resources)?;
+            scanned = self.scan_again(&seen.soup(bins.spools()), findings, handles, resources)?;
         }
         Ok(scanned.files)
     }

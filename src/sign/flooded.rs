@@ -6,6 +6,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::octree::BrickKey;
 use crate::sign::SignError;
 use crate::sign::exterior::Exterior;
 use crate::sign::graph::GraphBrick;
@@ -128,8 +129,17 @@ impl FloodReader<'_> {
         Ok(brick)
     }
 
+    /// The next brick, which is the one with this key, and what is known of its regions.
+    pub fn next_at(&mut self, key: BrickKey) -> Result<(FloodedBrick, Vec<u8>), SignError> {
+        let brick = self.next()?.filter(|brick| brick.key == key.0);
+        let (position, expected) = (key.position(), "the bricks of the flood");
+        let brick = brick.ok_or(SignError::Contradiction { brick: position, expected })?;
+        let regions = self.regions_of(&brick)?;
+        Ok((brick, regions))
+    }
+
     /// What is known of the regions of the brick that came last.
-    pub fn regions_of(&self, brick: &FloodedBrick) -> Result<Vec<u8>, StoreError> {
+    fn regions_of(&self, brick: &FloodedBrick) -> Result<Vec<u8>, StoreError> {
         let mut regions = Vec::new();
         let first = self.next - u64::from(brick.regions);
         self.regions.read(first, brick.regions as usize, &mut regions)?;

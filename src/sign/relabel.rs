@@ -49,11 +49,7 @@ pub fn relabel(
         resources.scales(|item: &RelabelItem| item.load.weight_bytes(hits)),
         || {
             let Some(load) = items.next()? else { return Ok(None) };
-            let brick = bricks.next()?.filter(|brick| brick.key == load.brick.0);
-            let position = load.brick.position();
-            let expected = "the bricks of the flood";
-            let brick = brick.ok_or(SignError::Contradiction { brick: position, expected })?;
-            let regions = bricks.regions_of(&brick)?;
+            let (brick, regions) = bricks.next_at(load.brick)?;
             Ok(Some(RelabelItem { load, base_inside: brick.base_inside == 1, regions }))
         },
         Workspace::default,

@@ -40,10 +40,7 @@ pub fn find_lost(
         resources.scales(|(item, _): &(LoadItem, Vec<u8>)| item.weight_bytes(hits)),
         || {
             let Some(load) = items.next()? else { return Ok(None) };
-            let brick = bricks.next()?.filter(|brick| brick.key == load.brick.0);
-            let (position, expected) = (load.brick.position(), "the bricks of the flood");
-            let brick = brick.ok_or(SignError::Contradiction { brick: position, expected })?;
-            let regions = bricks.regions_of(&brick)?;
+            let (_, regions) = bricks.next_at(load.brick)?;
             Ok(Some((load, regions)))
         },
         Loaded::default,
