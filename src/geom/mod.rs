@@ -2,6 +2,7 @@
 
 mod closest;
 mod ear_clipping;
+mod mix;
 pub mod morton;
 pub mod orientation;
 pub mod qef;
@@ -11,3 +12,4 @@ mod triangle_triangle_tests;
 
 pub use closest::closest_on_triangle;
 pub use ear_clipping::EarClipper;
+pub use mix::mix;

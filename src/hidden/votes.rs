@@ -6,6 +6,7 @@
 //! Memory:     a byte a triangle, in a table that spills; the places of one body.
 //! Source:     Wilson 1927, Probable inference (bounds of a share).
 
+use crate::geom::mix;
 use crate::hidden::{Bodies, HiddenStats, SEEN_SHARE};
 use crate::octree::{BURIED, ExposedPlace, LOST, Occupancy, Touched};
 use crate::store::{Resources, Sorter, StoreError, Table};
@@ -143,12 +144,9 @@ fn direction(place: &ExposedPlace, ray: u32) -> [f64; 3] {
     let mut state = u64::from(place.hash) << 32 | u64::from(ray);
     loop {
         let towards = [(); 3].map(|()| {
-            state = state.wrapping_add(0x9e37_79b9_7f4a_7c15);
-            let mut bits = state;
-            bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-            bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
+            state = mix(state);
             // 53 bits make a number from -1 to 1.
-            ((bits ^ bits >> 31) >> 11) as f64 * (2.0 / (1_u64 << 53) as f64) - 1.0
+            (state >> 11) as f64 * (2.0 / (1_u64 << 53) as f64) - 1.0
         });
         let square: f64 = towards.iter().map(|t| t * t).sum();
         // What lies in the ball is spread evenly over directions.

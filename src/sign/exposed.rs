@@ -4,6 +4,7 @@
 //! Out:     [`Exposed`], from each brick on its own.
 //! Memory:  the share; a brick per worker.
 
+use crate::geom::mix;
 use crate::octree::{
     ArchivedHitBrick, BURIED, BrickKey, Domain, ExposedPlace, Flips, HitEdge, InsideCorners, LINES,
     LOST, Occupancy, Regions, SIDE, SourcePlane, Touched, decode_hits, edge_position, find_regions,
@@ -173,10 +174,5 @@ impl BrickSays {
 /// A hash of an edge of the grid.
 fn hash_of(axis: usize, at: [u32; 3]) -> u32 {
     let [x, y, z] = at.map(u64::from);
-    let mut bits = x | y << 16 | z << 32 | (axis as u64) << 48;
-    // Finaliser of splitmix64 (Steele, Lea, Flood 2014).
-    bits = bits.wrapping_add(0x9e37_79b9_7f4a_7c15);
-    bits = (bits ^ bits >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
-    bits = (bits ^ bits >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
-    ((bits ^ bits >> 31) >> 32) as u32
+    (mix(x | y << 16 | z << 32 | (axis as u64) << 48) >> 32) as u32
 }
