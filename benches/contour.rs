@@ -3,7 +3,7 @@
 mod support;
 
 use brickmend::contour::{ContourOptions, ContourStats, Method, write_surface};
-use brickmend::io::{Format, create};
+use brickmend::io::{Format, WriteOptions, create};
 use brickmend::mesh::MeshSink;
 use brickmend::octree::Domain;
 use brickmend::store::{BrickFile, Resources};
@@ -56,7 +56,7 @@ fn contours(criterion: &mut Criterion) {
         group.bench_function(format!("{name} polygons to PLY"), |bencher| {
             let path = workshop.folder().join("out.ply");
             bencher.iter(|| {
-                let sink = create(&path, Format::Ply, resources.scratch);
+                let sink = create(&path, Format::Ply, resources.scratch, &WriteOptions::default());
                 let mut sink = sink.expect("the folder is writable");
                 write(files, &model.domain, &mut *sink, &resources)
             });

@@ -4,7 +4,8 @@ mod support;
 
 use std::path::Path;
 
-use brickmend::io::{Format, create};
+use brickmend::io::{Format, WriteOptions, create};
+use brickmend::mesh::SinkTriangles;
 use brickmend::mesh::shapes::Corners;
 use brickmend::monitor::Void;
 use brickmend::repair::{Depth, Limits, Settings, repair};
@@ -17,12 +18,14 @@ const DEPTH: u32 = 8;
 
 fn write_stl(triangles: &[Corners], path: &Path, workshop: &Workshop) {
     let mut sink =
-        create(path, Format::Stl, workshop.resources().scratch).expect("the folder is writable");
+        create(path, Format::Stl, workshop.resources().scratch, &WriteOptions::default())
+            .expect("the folder is writable");
     let vertices = triangles.iter().flatten().copied().collect::<Vec<_>>();
     let indices: Vec<[u32; 3]> =
         (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     sink.vertices(&vertices).expect("the folder is writable");
-    sink.triangles(&indices, triangles).expect("the folder is writable");
+    let triangles = SinkTriangles { indices: &indices, corners: triangles, surfaces: &[] };
+    sink.triangles(&triangles).expect("the folder is writable");
     sink.finish().expect("the folder is writable");
 }
 

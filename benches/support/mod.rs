@@ -9,7 +9,7 @@ use brickmend::ingest::{Bins, Settled, fill_bins, read_soup, settle};
 use brickmend::mesh::shapes::{
     Corners, ListedTriangles, Random, gear, rotation, sphere, transform,
 };
-use brickmend::mesh::{MeshSink, SinkState, SinkStats};
+use brickmend::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use brickmend::monitor::Void;
 use brickmend::octree::{Domain, Flips};
 use brickmend::patch::patch;
@@ -149,8 +149,8 @@ impl MeshSink for Nowhere {
         false
     }
 
-    fn triangles(&mut self, indices: &[[u32; 3]], _: &[Corners]) -> Result<(), Infallible> {
-        self.stats.triangles += indices.len() as u64;
+    fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), Infallible> {
+        self.stats.triangles += triangles.indices.len() as u64;
         Ok(())
     }
 

@@ -12,7 +12,7 @@ use crate::contour::{
     ContourOptions, ContourStats, Method, place_vertices, separate, write_surface,
 };
 use crate::mesh::shapes::{ListedTriangles, Random};
-use crate::mesh::{MeshSink, SinkState, SinkStats};
+use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use crate::monitor::Void;
 use crate::octree::{
     BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SnapBox,
@@ -41,13 +41,9 @@ impl MeshSink for Kept {
         Ok(())
     }
 
-    fn triangles(
-        &mut self,
-        indices: &[[u32; 3]],
-        corners: &[[[f64; 3]; 3]],
-    ) -> Result<(), Infallible> {
-        assert_eq!(indices.len(), corners.len());
-        self.triangles.extend_from_slice(indices);
+    fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), Infallible> {
+        assert_eq!(triangles.indices.len(), triangles.corners.len());
+        self.triangles.extend_from_slice(triangles.indices);
         Ok(())
     }
 

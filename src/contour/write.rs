@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::contour::maker::Maker;
 use crate::contour::mdc::{BrickTriangles, FAN_POINT, Layers, VERTICES};
 use crate::contour::{ContourError, ContourOptions, ContourStats, Method, mc};
-use crate::mesh::{MeshSink, SinkState};
+use crate::mesh::{MeshSink, SinkState, SinkTriangles};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::Domain;
 use crate::store::{BrickFile, Progress, Resources, StoreError, ordered_by_weight};
@@ -197,7 +197,9 @@ where
     fn take(&mut self, mut brick: BrickTriangles) -> Result<(), WriteError<S::Error>> {
         brick.number_fan_points(self.stats.vertices as u32);
         self.sink.vertices(&brick.fan_points).map_err(WriteError::Sink)?;
-        self.sink.triangles(&brick.indices, &brick.corners).map_err(WriteError::Sink)?;
+        let triangles =
+            SinkTriangles { indices: &brick.indices, corners: &brick.corners, surfaces: &[] };
+        self.sink.triangles(&triangles).map_err(WriteError::Sink)?;
         self.stats.vertices += brick.fan_points.len() as u64;
         self.stats.triangles += brick.indices.len() as u64;
         self.stats.add(&brick.stats);

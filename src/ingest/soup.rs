@@ -4,7 +4,8 @@ use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
-use crate::ingest::names::{PART_NAMES, write_names};
+use crate::ingest::names::{PART_NAMES, write_materials, write_names};
+use crate::io::MATERIALS;
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
@@ -73,8 +74,9 @@ pub struct Soup {
     pub spool: Spool<SoupTriangle>,
     /// Texture coordinates and colours, where the file has any.
     pub attributes: Option<Spool<AttributeRecord>>,
-    /// Names of the parts, see [`crate::ingest::PART_NAMES`].
-    pub names: Spool<u8>,
+    /// The spools of the names of parts, see [`crate::ingest::PART_NAMES`], and of the materials,
+    /// see [`crate::io::MATERIALS`].
+    pub names: [FileState; 2],
     /// What was found out.
     pub facts: SoupFacts,
 }
@@ -93,7 +95,10 @@ impl Soup {
         Ok(Self {
             spool: Spool::open(resources.scratch, FileState::find(files, SOUP)?)?,
             attributes: attributes.map(|f| Spool::open(resources.scratch, f)).transpose()?,
-            names: Spool::open(resources.scratch, FileState::find(files, PART_NAMES)?)?,
+            names: [
+                FileState::find(files, PART_NAMES)?.clone(),
+                FileState::find(files, MATERIALS)?.clone(),
+            ],
             facts,
         })
     }
@@ -102,10 +107,8 @@ impl Soup {
     #[must_use]
     pub fn files(&self) -> Vec<FileState> {
         let attributes = self.attributes.as_ref().map(|spool| spool.state().clone());
-        [self.spool.state().clone(), self.names.state().clone()]
-            .into_iter()
-            .chain(attributes)
-            .collect()
+        let names = self.names.iter().cloned();
+        std::iter::once(self.spool.state().clone()).chain(names).chain(attributes).collect()
     }
 }
 
@@ -144,7 +147,7 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     };
     stats.refuse_broken(strict)?;
     let (parts, materials) = (source.part_count(), source.material_count());
-    let names = write_names(source, resources)?;
+    let names = [write_names(source, resources)?, write_materials(source, resources)?];
     Ok(Soup {
         spool: writer.spool.finish()?,
         names,

@@ -20,6 +20,7 @@ mod obj;
 mod off;
 mod output;
 mod packed;
+mod palette;
 mod ply;
 mod polygon;
 mod stl;
@@ -35,6 +36,7 @@ pub use crate::io::error::{IoError, Place};
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
 pub use crate::io::output::{FACES, check_output};
+pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
 use crate::mesh::{MeshSink, MeshSource, SinkState};
@@ -89,6 +91,13 @@ pub struct ReadOptions {
     pub share_bytes: u64,
 }
 
+/// How to write.
+#[derive(Clone, Debug, Default)]
+pub struct WriteOptions {
+    /// The materials that triangles name; `None` where they name none.
+    pub palette: Option<Palette>,
+}
+
 /// A model file being read.
 pub type Source = Box<dyn MeshSource<Error = IoError> + Send>;
 
@@ -118,7 +127,12 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
 ///
 /// # Errors
 /// The file or a scratch file cannot be created.
-pub fn create(path: &Path, format: Format, scratch: &Scratch) -> Result<Sink, IoError> {
+pub fn create(
+    path: &Path,
+    format: Format,
+    scratch: &Scratch,
+    _options: &WriteOptions,
+) -> Result<Sink, IoError> {
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::create(path, scratch)?),
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
@@ -135,6 +149,7 @@ pub fn reopen(
     path: &Path,
     format: Format,
     scratch: &Scratch,
+    _options: &WriteOptions,
     state: &SinkState,
 ) -> Result<Sink, IoError> {
     Ok(match format {

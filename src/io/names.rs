@@ -39,22 +39,34 @@ impl Parts {
 #[repr(C)]
 struct Properties {
     diffuse: [f32; 3],
+    emissive: [f32; 3],
+    opacity: f32,
+    metallic: f32,
+    roughness: f32,
+    /// One more than the number of the texture; 0 without one.
+    texture: u32,
     flags: u32,
 }
 
 const TRANSPARENT: u32 = 1;
 const HAS_DIFFUSE: u32 = 2;
+const HAS_EMISSIVE: u32 = 4;
+const HAS_OPACITY: u32 = 8;
+const HAS_METALLIC: u32 = 16;
+const HAS_ROUGHNESS: u32 = 32;
 
 /// Numbered materials.
 pub(crate) struct Materials {
     names: Dictionary,
+    textures: Dictionary,
     properties: Table<Properties>,
 }
 
 impl Materials {
     pub(crate) fn new(scratch: &Scratch, share_bytes: u64) -> Self {
         Self {
-            names: Dictionary::new(scratch, share_bytes / 4 * 3),
+            names: Dictionary::new(scratch, share_bytes / 2),
+            textures: Dictionary::new(scratch, share_bytes / 4),
             properties: Table::new(scratch, share_bytes / 4),
         }
     }
@@ -79,20 +91,44 @@ impl Materials {
     }
 
     pub(crate) fn get(&mut self, number: u32) -> Result<Material, IoError> {
-        let Properties { diffuse, flags } = self.properties.get(number.into())?;
+        let properties = self.properties.get(number.into())?;
+        let has = |flag: u32| properties.flags & flag != 0;
+        let texture = properties.texture.checked_sub(1);
         Ok(Material {
             name: text(self.names.name(number)?),
-            transparent: flags & TRANSPARENT != 0,
-            diffuse: (flags & HAS_DIFFUSE != 0).then_some(diffuse),
+            transparent: has(TRANSPARENT),
+            diffuse: has(HAS_DIFFUSE).then_some(properties.diffuse),
+            opacity: has(HAS_OPACITY).then_some(properties.opacity),
+            emissive: has(HAS_EMISSIVE).then_some(properties.emissive),
+            metallic: has(HAS_METALLIC).then_some(properties.metallic),
+            roughness: has(HAS_ROUGHNESS).then_some(properties.roughness),
+            texture: texture.map(|number| self.textures.name(number).map(text)).transpose()?,
         })
     }
 
     /// Replaces what is known of a material besides its name.
     pub(crate) fn set(&mut self, number: u32, material: &Material) -> Result<(), IoError> {
-        let transparent = if material.transparent { TRANSPARENT } else { 0 };
-        let coloured = if material.diffuse.is_some() { HAS_DIFFUSE } else { 0 };
-        let diffuse = material.diffuse.unwrap_or_default();
-        let properties = Properties { diffuse, flags: transparent | coloured };
+        let flags = [
+            (material.transparent, TRANSPARENT),
+            (material.diffuse.is_some(), HAS_DIFFUSE),
+            (material.emissive.is_some(), HAS_EMISSIVE),
+            (material.opacity.is_some(), HAS_OPACITY),
+            (material.metallic.is_some(), HAS_METALLIC),
+            (material.roughness.is_some(), HAS_ROUGHNESS),
+        ];
+        let texture = match &material.texture {
+            Some(name) => 1 + self.textures.number(name.as_bytes())?,
+            None => 0,
+        };
+        let properties = Properties {
+            diffuse: material.diffuse.unwrap_or_default(),
+            emissive: material.emissive.unwrap_or_default(),
+            opacity: material.opacity.unwrap_or_default(),
+            metallic: material.metallic.unwrap_or_default(),
+            roughness: material.roughness.unwrap_or_default(),
+            texture,
+            flags: flags.iter().map(|&(has, flag)| if has { flag } else { 0 }).sum(),
+        };
         Ok(self.properties.set(number.into(), properties)?)
     }
 }

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use proptest::prelude::*;
 
-use crate::io::{BATCH_TRIANGLES, Format, IoError, ReadOptions, create, open};
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::io::{BATCH_TRIANGLES, Format, IoError, ReadOptions, WriteOptions, create, open};
+use crate::mesh::{Discarded, Material, MeshSource, Part, SinkTriangles, TriangleBatch};
 use crate::store::Scratch;
 
 /// Everything that a reader delivered, in one batch.
@@ -92,14 +92,15 @@ pub(crate) fn read_bytes(name: &str, content: &[u8]) -> Result<Content, IoError>
 /// Writes a mesh whose last vertices come after the first triangles.
 fn write(path: &Path, format: Format, positions: &[[f64; 3]], triangles: &[[u32; 3]]) {
     let scratch = Scratch::new(path.parent().expect("a file in a folder"));
-    let mut sink = create(path, format, &scratch).expect("creates");
+    let mut sink = create(path, format, &scratch, &WriteOptions::default()).expect("creates");
     let (early, late) = positions.split_at(positions.len() / 2);
     let is_early = |t: &&[u32; 3]| t.iter().all(|&v| (v as usize) < early.len());
     let first: Vec<_> = triangles.iter().take_while(is_early).copied().collect();
     for (vertices, triangles) in [(early, &first[..]), (late, &triangles[first.len()..])] {
         sink.vertices(vertices).expect("writes");
         let corners: Vec<_> = triangles.iter().map(|t| t.map(|v| positions[v as usize])).collect();
-        sink.triangles(triangles, &corners).expect("writes");
+        let triangles = SinkTriangles { indices: triangles, corners: &corners, surfaces: &[] };
+        sink.triangles(&triangles).expect("writes");
     }
     let stats = sink.finish().expect("finishes");
     assert_eq!(stats.triangles, triangles.len() as u64);

@@ -7,17 +7,6 @@ pub struct Part {
     pub name: String,
 }
 
-/// A material of the input file.
-#[derive(Clone, Debug, PartialEq, Default)]
-pub struct Material {
-    /// The name as written in the file; may be empty.
-    pub name: String,
-    /// Whether light passes (MTL `d` < 1 or `Tr` > 0): such a surface neither seals nor hides.
-    pub transparent: bool,
-    /// Diffuse colour, linear 0..1, where the file states one.
-    pub diffuse: Option<[f32; 3]>,
-}
-
 /// The polygon number of a triangle that came from no polygon of the file.
 pub const NO_POLYGON: u32 = u32::MAX;
 

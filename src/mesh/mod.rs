@@ -5,9 +5,11 @@
 pub mod shapes;
 
 mod batch;
+mod material;
 mod sink;
 mod source;
 
-pub use batch::{Material, NO_POLYGON, Part, TriangleBatch};
-pub use sink::{MeshSink, SinkFile, SinkState, SinkStats};
+pub use batch::{NO_POLYGON, Part, TriangleBatch};
+pub use material::{Material, Surface};
+pub use sink::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles};
 pub use source::{Discarded, MeshSource};

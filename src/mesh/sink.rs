@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::Surface;
+
 /// A file that a sink has written, as far as it goes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct SinkFile {
@@ -35,6 +37,18 @@ pub struct SinkStats {
     pub file: SinkFile,
 }
 
+/// Triangles for a sink, as parallel slices.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct SinkTriangles<'t> {
+    /// Vertex numbers.
+    pub indices: &'t [[u32; 3]],
+    /// The same corners' positions, for formats without indices; may be empty where the sink needs
+    /// none.
+    pub corners: &'t [[[f64; 3]; 3]],
+    /// What they are; empty where the sink was not told of any material.
+    pub surfaces: &'t [Surface],
+}
+
 /// Takes vertices and triangles in order and writes a file.
 ///
 /// A triangle may name any vertex that was handed over before it.
@@ -48,22 +62,16 @@ pub trait MeshSink {
     /// The file cannot be written.
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), Self::Error>;
 
-    /// Whether [`MeshSink::triangles`] needs the corners' positions; `corners` may be empty where
-    /// it does not.
+    /// Whether [`MeshSink::triangles`] needs the corners' positions.
     fn needs_corners(&self) -> bool {
         true
     }
 
-    /// Appends triangles: vertex numbers, and the same corners' positions for formats without
-    /// indices. Both slices have the same length, unless the sink needs no corners.
+    /// Appends triangles.
     ///
     /// # Errors
     /// The file cannot be written.
-    fn triangles(
-        &mut self,
-        indices: &[[u32; 3]],
-        corners: &[[[f64; 3]; 3]],
-    ) -> Result<(), Self::Error>;
+    fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), Self::Error>;
 
     /// Bytes taken so far, about.
     fn bytes_so_far(&self) -> u64;

@@ -12,7 +12,7 @@ use crate::ingest::{
     Bins, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins, read_soup,
     settle,
 };
-use crate::io::{ReadOptions, check_output};
+use crate::io::{ReadOptions, WriteOptions, check_output};
 use crate::mesh::{SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::{Domain, Flips};
@@ -345,9 +345,12 @@ impl Run<'_> {
         let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
         let start = WriteProgress::noted(resources);
         let (part, scratch) = (workspace.part(), resources.scratch);
+        let write_options = WriteOptions::default();
         let sink = match &start {
-            Some(noted) => crate::io::reopen(part, self.format, scratch, &noted.sink),
-            None => crate::io::create(part, self.format, scratch),
+            Some(noted) => {
+                crate::io::reopen(part, self.format, scratch, &write_options, &noted.sink)
+            }
+            None => crate::io::create(part, self.format, scratch, &write_options),
         };
         let mut sink = sink.map_err(RepairError::Output)?;
         let placed = (&findings.contour, start);

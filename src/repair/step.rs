@@ -6,6 +6,7 @@
 use crate::bridge::{ADDED, ADDED_ENTRIES, LEFT_OUT};
 use crate::contour::{CELLS, SURFACE};
 use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, PART_NAMES, SOUP};
+use crate::io::MATERIALS;
 use crate::monitor::Stage;
 use crate::octree::FLIPS;
 use crate::scan::HITS;
@@ -103,7 +104,7 @@ impl Step {
     /// The files that it leaves. `attributes.spool` is there only if the input has attributes.
     pub const fn writes(self) -> &'static [&'static str] {
         match self {
-            Self::Read => &[SOUP, ATTRIBUTES, PART_NAMES],
+            Self::Read => &[SOUP, ATTRIBUTES, PART_NAMES, MATERIALS],
             Self::Bin => &[BINS, BIN_ENTRIES],
             Self::Settle => &[DROPS],
             Self::Mend => &[LEFT_OUT, ADDED, ADDED_ENTRIES],
@@ -123,7 +124,7 @@ impl Step {
     pub const fn reads(self) -> &'static [&'static str] {
         match self {
             Self::Read => &[],
-            Self::Bin => &[SOUP, PART_NAMES],
+            Self::Bin => &[SOUP, PART_NAMES, MATERIALS],
             Self::Settle => &[BINS, BIN_ENTRIES],
             Self::Mend => &[BINS, BIN_ENTRIES, DROPS],
             Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
@@ -132,6 +133,7 @@ impl Step {
             Self::Revise => &[
                 SOUP,
                 PART_NAMES,
+                MATERIALS,
                 BINS,
                 BIN_ENTRIES,
                 LEFT_OUT,
@@ -145,7 +147,7 @@ impl Step {
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS],
             Self::Choose | Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],
-            Self::Write => &[CELLS, SURFACE],
+            Self::Write => &[CELLS, SURFACE, MATERIALS],
             Self::Prove => &[OUTPUT_PART],
         }
     }

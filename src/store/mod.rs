@@ -20,6 +20,7 @@ mod scratch_file;
 mod sort;
 mod spool;
 mod table;
+mod texts;
 mod unite;
 
 pub use accountant::{Accountant, Lease};
@@ -39,7 +40,8 @@ pub use scratch_file::ScratchFile;
 pub use sort::{Record, Sorted, Sorter};
 pub use spool::{Spool, SpoolPeek, SpoolReader, SpoolWriter};
 pub use table::Table;
+pub use texts::{Texts, TextsWriter};
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.
-pub const FORMAT_VERSION: u32 = 5;
+pub const FORMAT_VERSION: u32 = 6;

@@ -133,12 +133,20 @@ impl Library {
     fn define(&mut self, path: &Path, text: &str) -> Result<(), IoError> {
         let Ok((materials, _)) = tobj::load_mtl_buf(&mut text.as_bytes()) else { return Ok(()) };
         for material in materials {
-            let opaque = material.dissolve.unwrap_or(1.0) >= 1.0;
-            let tr = material.unknown_param.get("Tr").and_then(|tr| tr.parse::<f64>().ok());
+            let stated = |name: &str| material.unknown_param.get(name).map(String::as_str);
+            let number = |name| stated(name).and_then(|text| text.parse::<f32>().ok());
+            let dissolve = material.dissolve.map(|dissolve| dissolve as f32);
+            let opacity = dissolve.or(number("Tr").map(|tr| 1.0 - tr));
             let material = Material {
-                name: material.name,
-                transparent: !opaque || tr.is_some_and(|tr| tr > 0.0),
+                transparent: opacity.is_some_and(|opacity| opacity < 1.0)
+                    || number("Tr").is_some_and(|tr| tr > 0.0),
                 diffuse: material.diffuse.map(|colour| colour.map(|channel| channel as f32)),
+                opacity: opacity.map(|opacity| opacity.clamp(0.0, 1.0)),
+                emissive: stated("Ke").and_then(colour),
+                metallic: number("Pm"),
+                roughness: number("Pr"),
+                texture: material.diffuse_texture,
+                name: material.name,
             };
             let number = self.defined.number(path, &material.name)?;
             self.defined.set(number, &material)?;
@@ -154,10 +162,14 @@ enum Keyword {
     Diffuse,
     Dissolve,
     Transparency,
+    Emissive,
+    Metallic,
+    Roughness,
+    Texture,
 }
 
 /// The statements of one material, by keyword.
-type Lines = [String; 4];
+type Lines = [String; 8];
 
 /// The next statement for `tobj`, in its words; `None` at the end of the file.
 fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
@@ -168,13 +180,24 @@ fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
             Some(b"Kd") => (Keyword::Diffuse, 3),
             Some(b"d") => (Keyword::Dissolve, 1),
             Some(b"Tr") => (Keyword::Transparency, 1),
+            Some(b"Ke") => (Keyword::Emissive, 3),
+            Some(b"Pm") => (Keyword::Metallic, 1),
+            Some(b"Pr") => (Keyword::Roughness, 1),
+            Some(b"map_Kd") => (Keyword::Texture, 0),
             Some(_) => {
                 words.skip_line()?;
                 continue;
             }
         };
-        if keyword == Keyword::Name {
-            return Ok(Some((keyword, format!("newmtl {}\n", words.name()?))));
+        match keyword {
+            Keyword::Name => return Ok(Some((keyword, format!("newmtl {}\n", words.name()?)))),
+            // The name may follow options, and may hold blanks: what begins with a dash is skipped.
+            Keyword::Texture => {
+                let line = words.name()?;
+                let name = texture_name(&line);
+                return Ok(Some((keyword, format!("map_Kd {name}\n"))));
+            }
+            _ => {}
         }
         let mut numbers = Vec::new();
         while let Some(word) = words.word_on_line()? {
@@ -183,8 +206,34 @@ fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
         }
         if numbers.len() == needed {
             let numbers: Vec<_> = numbers.iter().map(f64::to_string).collect();
-            let word = ["newmtl", "Kd", "d", "Tr"][keyword as usize];
+            let word = ["newmtl", "Kd", "d", "Tr", "Ke", "Pm", "Pr", "map_Kd"][keyword as usize];
             return Ok(Some((keyword, format!("{word} {}\n", numbers.join(" ")))));
         }
     }
+}
+
+/// Three numbers in words.
+fn colour(text: &str) -> Option<[f32; 3]> {
+    let mut numbers = text.split_ascii_whitespace().map(|word| word.parse().ok());
+    Some([numbers.next()??, numbers.next()??, numbers.next()??])
+}
+
+/// The name of an image behind the options of its statement (`-s 1 1 1`, `-clamp on`, ...).
+fn texture_name(line: &str) -> &str {
+    let mut rest = line.trim_start();
+    while rest.starts_with('-') {
+        rest = after_word(rest);
+        // Numbers and switches belong to the option.
+        while let Some(word) = rest.split_ascii_whitespace().next()
+            && (["on", "off"].contains(&word) || word.parse::<f64>().is_ok())
+            && !after_word(rest).is_empty()
+        {
+            rest = after_word(rest);
+        }
+    }
+    rest
+}
+
+fn after_word(text: &str) -> &str {
+    text.split_once(|c: char| c.is_ascii_whitespace()).map_or("", |(_, rest)| rest.trim_start())
 }

@@ -8,7 +8,7 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
 use crate::io::output::Output;
-use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats};
+use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles};
 use crate::store::Scratch;
 
 /// Writes `v` and `f` lines.
@@ -60,11 +60,8 @@ impl MeshSink for ObjWriter {
         Ok(())
     }
 
-    fn triangles(
-        &mut self,
-        indices: &[[u32; 3]],
-        _corners: &[[[f64; 3]; 3]],
-    ) -> Result<(), IoError> {
+    fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
+        let SinkTriangles { indices, .. } = *triangles;
         self.triangles += indices.len() as u64;
         for triangle in indices {
             self.text.clear();

@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::io::error::IoError;
 use crate::io::output::{Aside, Output};
-use crate::mesh::{MeshSink, SinkState, SinkStats};
+use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use crate::store::Scratch;
 
 /// Room for any two counts.
@@ -69,11 +69,8 @@ impl MeshSink for PlyWriter {
         Ok(())
     }
 
-    fn triangles(
-        &mut self,
-        indices: &[[u32; 3]],
-        _corners: &[[[f64; 3]; 3]],
-    ) -> Result<(), IoError> {
+    fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
+        let SinkTriangles { indices, .. } = *triangles;
         self.triangles += indices.len() as u64;
         let mut bytes = [3; BLOCK * FACE_BYTES];
         for block in indices.chunks(BLOCK) {

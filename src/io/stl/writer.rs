@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::output::Output;
 use crate::io::stl::binary::{FACET_BYTES, HEADER_BYTES};
-use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats};
+use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles};
 use crate::store::Scratch;
 
 /// Must not begin with `solid`, or readers take the file for text.
@@ -49,11 +49,8 @@ impl MeshSink for StlWriter {
         Ok(())
     }
 
-    fn triangles(
-        &mut self,
-        _indices: &[[u32; 3]],
-        corners: &[[[f64; 3]; 3]],
-    ) -> Result<(), IoError> {
+    fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
+        let SinkTriangles { corners, .. } = *triangles;
         self.facets += corners.len() as u64;
         if self.facets > u64::from(u32::MAX) {
             let path = self.output.path().to_path_buf();
@@ -121,8 +118,10 @@ mod tests {
             StlWriter::create(&folder.path().join("a.stl"), &Scratch::new(folder.path()))
                 .expect("creates");
         writer.facets = u64::from(u32::MAX) - 1;
-        writer.triangles(&[[0; 3]], &[[[0.0; 3]; 3]]).expect("the last one fits");
-        let refused = writer.triangles(&[[0; 3]], &[[[0.0; 3]; 3]]);
+        let (indices, corners) = ([[0; 3]], [[[0.0; 3]; 3]]);
+        let facet = SinkTriangles { indices: &indices, corners: &corners, surfaces: &[] };
+        writer.triangles(&facet).expect("the last one fits");
+        let refused = writer.triangles(&facet);
         assert!(matches!(refused, Err(IoError::TooLarge { .. })));
     }
 }

@@ -1,0 +1,64 @@
+//! What a surface is made of, and how a triangle of the output names it.
+
+use serde::{Deserialize, Serialize};
+
+/// A material of a file. What the file does not state is `None`.
+#[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
+pub struct Material {
+    /// The name as written in the file; may be empty.
+    pub name: String,
+    /// Whether light passes (MTL `d` < 1 or `Tr` > 0, glTF `BLEND` or transmission): such a surface
+    /// neither seals nor hides.
+    pub transparent: bool,
+    /// Base colour, as the file states it, 0..1.
+    pub diffuse: Option<[f32; 3]>,
+    /// 0 lets all light pass, 1 none.
+    pub opacity: Option<f32>,
+    /// Light of its own, 0 and up.
+    pub emissive: Option<[f32; 3]>,
+    /// 0 for dielectrics, 1 for metals.
+    pub metallic: Option<f32>,
+    /// 0 for mirrors, 1 for chalk.
+    pub roughness: Option<f32>,
+    /// Image of the base colour: a path beside the file, as written there.
+    pub texture: Option<String>,
+}
+
+/// What a triangle of the output is: its material, and whether it closes what was open. Packed in
+/// four bytes.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub struct Surface(u32);
+
+impl Surface {
+    const PATCH: u32 = 1 << 31;
+
+    /// A surface of this material; `is_patch` where it is not in the input.
+    #[must_use]
+    pub const fn new(material: u32, is_patch: bool) -> Self {
+        Self(material & !Self::PATCH | if is_patch { Self::PATCH } else { 0 })
+    }
+
+    /// The number of the material.
+    #[must_use]
+    pub const fn material(self) -> u32 {
+        self.0 & !Self::PATCH
+    }
+
+    /// Whether it closes what was open in the input.
+    #[must_use]
+    pub const fn is_patch(self) -> bool {
+        self.0 & Self::PATCH != 0
+    }
+
+    /// The packed number: the material, and the top bit for patches.
+    #[must_use]
+    pub const fn bits(self) -> u32 {
+        self.0
+    }
+
+    /// The surface of a packed number.
+    #[must_use]
+    pub const fn from_bits(bits: u32) -> Self {
+        Self(bits)
+    }
+}
