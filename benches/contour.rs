@@ -2,7 +2,7 @@
 
 mod support;
 
-use brickmend::contour::{ContourOptions, ContourStats, Method, write_surface};
+use brickmend::contour::{ContourOptions, ContourStats, Method, SurfaceDetail, write_surface};
 use brickmend::io::{Format, WriteOptions, create};
 use brickmend::mesh::MeshSink;
 use brickmend::octree::Domain;
@@ -13,8 +13,12 @@ use std::hint::black_box;
 use crate::support::{Nowhere, Workshop, shapes};
 
 const DEPTH: u32 = 8;
-const LEAVES: ContourOptions =
-    ContourOptions { method: Method::Mdc, crease_deg: 12.0, decimate_cells: 0.0 };
+const LEAVES: ContourOptions = ContourOptions {
+    method: Method::Mdc,
+    crease_deg: 12.0,
+    decimate_cells: 0.0,
+    surfaces: SurfaceDetail::None,
+};
 const CLUSTERS: ContourOptions = ContourOptions { decimate_cells: 0.1, ..LEAVES };
 
 fn write<S: MeshSink + ?Sized>(

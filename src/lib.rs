@@ -35,4 +35,5 @@ pub mod report;
 pub mod scan;
 pub mod sign;
 pub mod store;
+pub mod transfer;
 pub mod verify;

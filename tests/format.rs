@@ -293,7 +293,12 @@ fn sign_and_cell_bricks_are_as_documented() {
     assert_eq!(PATCH, 1 << 31);
     says("SignBrick", "bit 31 = 1: a patch; bits 0..15 are the offset");
     let crossings = vec![Crossing { edge: 5, plane: PATCH | 0xffff }];
-    let bytes = encode(&SignBrick { base_inside: true, crossings, planes: Vec::new() });
+    let bytes = encode(&SignBrick {
+        base_inside: true,
+        crossings,
+        planes: Vec::new(),
+        borders: Vec::new(),
+    });
     let signs = decode_signs(&bytes).expect("what was written validates");
     assert_eq!((size_of_val(&signs.base_inside), size_of_val(&signs.crossings[0])), (1, 8));
     says("CellBrick", "bits  0..14  cell number");

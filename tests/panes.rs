@@ -3,6 +3,7 @@
 mod support;
 
 use std::fmt::Write;
+use std::path::PathBuf;
 
 use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, transform};
 use brickmend::repair::{Limits, Outcome, Settings};
@@ -38,14 +39,13 @@ fn square([lo, hi]: [f64; 2], height: f64) -> Vec<Corners> {
     vec![[p, q, r], [p, r, s]]
 }
 
-/// Repairs a soup with panes of this opacity; the proof demands that cavities face inward.
-fn repair_with_panes(
+/// Writes a soup with panes of this opacity.
+fn write_with_panes(
+    workshop: &Workshop,
     soup: &[Corners],
     panes: &[Corners],
     opacity: f64,
-    settings: &Settings,
-) -> (Outcome, Surface) {
-    let workshop = Workshop::new();
+) -> PathBuf {
     let materials = format!("newmtl clear\nKd 1 1 1\nd {opacity}\nnewmtl steel\nKd 0.5 0.5 0.5\n");
     let library = workshop.write_text("mtl", &materials);
     let name = library.file_name().expect("a file").to_string_lossy().into_owned();
@@ -61,7 +61,18 @@ fn repair_with_panes(
             next += 3;
         }
     }
-    let input = workshop.write_text("obj", &text);
+    workshop.write_text("obj", &text)
+}
+
+/// Repairs a soup with panes of this opacity; the proof demands that cavities face inward.
+fn repair_with_panes(
+    soup: &[Corners],
+    panes: &[Corners],
+    opacity: f64,
+    settings: &Settings,
+) -> (Outcome, Surface) {
+    let workshop = Workshop::new();
+    let input = write_with_panes(&workshop, soup, panes, opacity);
     let repaired = workshop.repair(&input, "ply", settings, &Limits::default()).expect("a result");
     let rule = if opacity < 1.0 { FillRule::Nonzero } else { settings.fill_rule };
     let surface = Surface::read_proven(&repaired.path, rule);
@@ -140,4 +151,25 @@ fn a_pane_thinner_than_a_cell_is_thickened_whole() {
         thickened += u32::from(is_thick);
     }
     assert!((1..5).contains(&thickened), "{thickened}");
+}
+
+#[test]
+fn limits_change_no_byte_of_what_lies_behind_panes() {
+    let mut random = Random::new(37);
+    let (turn, shift) = (rotation(&mut random), DVec3::from(random.point()));
+    let place = |soup: &[Corners]| transform(soup, turn, shift);
+    let soup = place(&[oven(), content()].concat());
+    let glass = place(&square([0.0, 0.9], 1.0));
+    let workshop = Workshop::new();
+    let input = write_with_panes(&workshop, &soup, &glass, 0.3);
+    let all = [
+        Limits::default(),
+        Limits { share_bytes: Some(16 << 10), ..Limits::default() },
+        Limits { threads: 8, ..Limits::default() },
+    ];
+    let files = all.map(|limits| {
+        let repaired = workshop.repair(&input, "ply", &at_depth(7), &limits).expect("a result");
+        std::fs::read(&repaired.path).expect("it is there")
+    });
+    assert!(files.iter().all(|other| *other == files[0]));
 }

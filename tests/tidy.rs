@@ -55,6 +55,7 @@ const HOMES: [(&str, &[&str]); 17] = [
             "store/manifest.rs",
             "store/checkpoint.rs",
             "store/brick/",
+            "octree/border.rs",
             "octree/brick.rs",
             "octree/cell_brick.rs",
             "octree/edge_brick.rs",

@@ -13,7 +13,7 @@ use crate::bridge::sheets::{Sheets, Side};
 use crate::bridge::{Like, PASSING};
 use crate::octree::points::{owner, unpack_ends};
 use crate::octree::{
-    BinnedSoup, BorderUse, Domain, MOST_USES, SoupTriangle, TRANSPARENT, each_border,
+    BinnedSoup, BorderUse, CLOSES, Domain, MOST_USES, SoupTriangle, TRANSPARENT, each_border,
 };
 use crate::store::{Record, Resources, Sorter, Spool, SpoolWriter, StoreError};
 
@@ -57,7 +57,7 @@ impl RimEdge {
 
     /// What a triangle that closes the rim has from the one along it.
     pub fn like(&self) -> Like {
-        Like { part: self.part, material: self.material, of: self.source }
+        Like { part: self.part, material: self.material | CLOSES, of: self.source }
     }
 
     /// Whether light passes its triangle.

@@ -61,6 +61,10 @@ pub struct ResultArguments {
     /// the proof of another one's file fails, the file is kept and the run ends with 4.
     #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
     method: MethodName,
+    /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ
+    /// and PLY.
+    #[arg(long)]
+    tag_patches: bool,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
     #[arg(long)]
     strict: bool,
@@ -188,6 +192,7 @@ impl ResultArguments {
             method,
             decimate,
             max_triangles,
+            tag_patches: self.tag_patches,
             strict,
         }
     }

@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use crate::contour::noise_tests::{Contoured, Hit, brick_at, contour_bricks};
-use crate::contour::{ContourOptions, Method};
+use crate::contour::{ContourOptions, Method, SurfaceDetail};
 use crate::mesh::shapes::Random;
 use crate::octree::{BrickKey, Domain, SIDE, SignBrick, SnapBox, SourcePlane};
 use crate::store::Backing;
@@ -87,7 +87,12 @@ impl Solid {
         let domain = Domain::around(&unit, self.depth, false).expect("room enough");
         let bricks = (0..1_u64 << (3 * (self.depth - 5)))
             .filter_map(|key| Some((key, self.brick(key, f64::from(domain.cell_units))?)));
-        let options = ContourOptions { method: Method::Mdc, crease_deg: 12.0, decimate_cells };
+        let options = ContourOptions {
+            method: Method::Mdc,
+            crease_deg: 12.0,
+            decimate_cells,
+            surfaces: SurfaceDetail::None,
+        };
         let found = contour_bricks(&domain, bricks, &options, backing, threads);
         assert!(found.proof.holds(), "{:?}", found.proof.failures());
         assert_eq!(found.proof.unused_vertices, 0);

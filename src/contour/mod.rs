@@ -30,6 +30,7 @@ mod write;
 
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::Surface;
 use crate::octree::{BrickError, Domain};
 use crate::store::{BrickFile, BrickWriter, Resources, StoreError};
 
@@ -93,6 +94,32 @@ pub struct ContourOptions {
     pub crease_deg: f64,
     /// Largest distance of a cluster's vertex to the planes it stands for, in cells; 0 for none.
     pub decimate_cells: f64,
+    /// What triangles tell of what they are ([`crate::mesh::Surface`]).
+    pub surfaces: SurfaceDetail,
+}
+
+/// What triangles of the output tell of what they are.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SurfaceDetail {
+    /// Nothing.
+    #[default]
+    None,
+    /// Their material; patches have that of their rim.
+    Material,
+    /// Their material, and whether they close what was open.
+    MaterialAndPatch,
+}
+
+impl SurfaceDetail {
+    /// As much of a packed [`crate::mesh::Surface`] as is told.
+    pub(crate) const fn of(self, bits: u32) -> u32 {
+        match self {
+            Self::None => 0,
+            Self::Material => Surface::from_bits(bits).material(),
+            Self::MaterialAndPatch => bits,
+        }
+    }
 }
 
 impl ContourOptions {

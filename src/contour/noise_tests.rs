@@ -9,7 +9,7 @@ use glam::DVec3;
 
 use crate::contour::mdc::cut_of;
 use crate::contour::{
-    ContourOptions, ContourStats, Method, place_vertices, separate, write_surface,
+    ContourOptions, ContourStats, Method, SurfaceDetail, place_vertices, separate, write_surface,
 };
 use crate::mesh::shapes::{ListedTriangles, Random};
 use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
@@ -162,7 +162,12 @@ pub fn contour_by(method: Method, field: &Field, backing: Backing, threads: usiz
     let unit = SnapBox { lo: [0.0; 3], hi: [1.0; 3] };
     let domain = Domain::around(&unit, DEPTH, false).expect("room enough");
     let brick = |key| field.brick(BrickKey(key).position(), f64::from(domain.cell_units));
-    let options = ContourOptions { method, crease_deg: 12.0, decimate_cells: field.decimate_cells };
+    let options = ContourOptions {
+        method,
+        crease_deg: 12.0,
+        decimate_cells: field.decimate_cells,
+        surfaces: SurfaceDetail::None,
+    };
     contour_bricks(&domain, (0..8).map(|key| (key, brick(key))), &options, backing, threads)
 }
 

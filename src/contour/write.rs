@@ -197,8 +197,11 @@ where
     fn take(&mut self, mut brick: BrickTriangles) -> Result<(), WriteError<S::Error>> {
         brick.number_fan_points(self.stats.vertices as u32);
         self.sink.vertices(&brick.fan_points).map_err(WriteError::Sink)?;
-        let triangles =
-            SinkTriangles { indices: &brick.indices, corners: &brick.corners, surfaces: &[] };
+        let triangles = SinkTriangles {
+            indices: &brick.indices,
+            corners: &brick.corners,
+            surfaces: &brick.surfaces,
+        };
         self.sink.triangles(&triangles).map_err(WriteError::Sink)?;
         self.stats.vertices += brick.fan_points.len() as u64;
         self.stats.triangles += brick.indices.len() as u64;

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::error::IngestError;
 use crate::ingest::names::{PART_NAMES, write_materials, write_names};
 use crate::io::MATERIALS;
-use crate::mesh::{Discarded, MeshSource, TriangleBatch};
+use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
 use crate::store::{FileState, Resources, Spool, SpoolWriter, StoreError};
@@ -37,6 +37,12 @@ pub struct SoupFacts {
     pub parts: u64,
     /// Materials that have triangles.
     pub materials: u64,
+    /// Whether there are several, or the file says anything of the one.
+    pub has_materials: bool,
+    /// Whether the file has texture coordinates.
+    pub has_uvs: bool,
+    /// Whether the file has colours of vertices.
+    pub has_colours: bool,
     /// Counts.
     pub stats: SoupStats,
 }
@@ -147,12 +153,32 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     };
     stats.refuse_broken(strict)?;
     let (parts, materials) = (source.part_count(), source.material_count());
+    let has_materials = has_materials(source)?;
     let names = [write_names(source, resources)?, write_materials(source, resources)?];
     Ok(Soup {
         spool: writer.spool.finish()?,
         names,
         attributes: writer.attributes.map(SpoolWriter::finish).transpose()?,
-        facts: SoupFacts { bounds: writer.bounds, parts, materials, stats },
+        facts: SoupFacts {
+            bounds: writer.bounds,
+            parts,
+            materials,
+            has_materials,
+            has_uvs: writer.has_uvs,
+            has_colours: writer.has_colours,
+            stats,
+        },
+    })
+}
+
+/// Whether a source that was read to its end says anything of materials.
+pub(super) fn has_materials<S: MeshSource + ?Sized>(
+    source: &mut S,
+) -> Result<bool, IngestError<S::Error>> {
+    Ok(match source.material_count() {
+        0 => false,
+        1 => source.material(0).map_err(IngestError::Source)? != Material::default(),
+        _ => true,
     })
 }
 
@@ -163,6 +189,8 @@ struct Writer<'r> {
     bounds: SnapBox,
     delivered: u64,
     transparent: u64,
+    has_uvs: bool,
+    has_colours: bool,
     /// The last material that was asked for, and its number as triangles have it.
     last_material: Option<(u32, u32)>,
 }
@@ -176,6 +204,8 @@ impl<'r> Writer<'r> {
             bounds: SnapBox::EMPTY,
             delivered: 0,
             transparent: 0,
+            has_uvs: false,
+            has_colours: false,
             last_material: None,
         })
     }
@@ -185,6 +215,8 @@ impl<'r> Writer<'r> {
         batch: &TriangleBatch,
         source: &mut S,
     ) -> Result<(), IngestError<S::Error>> {
+        self.has_uvs |= !batch.uvs.is_empty();
+        self.has_colours |= !batch.colours.is_empty();
         let with_attributes = !batch.uvs.is_empty() || !batch.colours.is_empty();
         if with_attributes && self.attributes.is_none() {
             self.attributes = Some(SpoolWriter::create(self.resources.scratch, ATTRIBUTES)?);

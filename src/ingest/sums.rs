@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
 use crate::ingest::rims::{RimSketch, Rims};
-use crate::ingest::soup::SoupStats;
+use crate::ingest::soup::{SoupStats, has_materials};
 use crate::mesh::{MeshSource, TriangleBatch};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::SnapBox;
@@ -40,6 +40,8 @@ pub struct SoupSums {
     pub rims: Rims,
     /// Whether there are texture coordinates or colours.
     pub has_attributes: bool,
+    /// Whether the file says anything of materials.
+    pub has_materials: bool,
 }
 
 impl SoupSums {
@@ -78,6 +80,7 @@ pub fn sum_up<S: MeshSource + ?Sized>(
         }
     }
     monitor.count(Counter::InputBytesRead, source.bytes_read() - read_bytes);
+    adder.sums.has_materials = has_materials(source)?;
     let mut sums = adder.sums;
     sums.stats.discarded = source.discarded();
     sums.stats.input_bytes = source.bytes_read();
@@ -101,6 +104,7 @@ impl Adder {
             extent: 0.0,
             rims: Rims::default(),
             has_attributes: false,
+            has_materials: false,
         };
         Self { sums, rims: RimSketch::new() }
     }

@@ -19,6 +19,7 @@ mod numbers;
 mod obj;
 mod off;
 mod output;
+mod output_names;
 mod packed;
 mod palette;
 mod ply;
@@ -33,6 +34,7 @@ use std::path::Path;
 use crate::io::detect::open_model;
 pub use crate::io::detect::{detect, format_of_extension};
 pub use crate::io::error::{IoError, Place};
+pub use crate::io::obj::{LIBRARY_MARK, library_name, write_library};
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
 pub use crate::io::output::{FACES, check_output};
@@ -77,6 +79,12 @@ impl Format {
         }
     }
 
+    /// Whether triangles have materials.
+    #[must_use]
+    pub fn has_materials(self) -> bool {
+        matches!(self, Self::Obj | Self::Ply)
+    }
+
     /// Whether triangles name vertices by number.
     #[must_use]
     pub fn has_indices(self) -> bool {
@@ -96,6 +104,10 @@ pub struct ReadOptions {
 pub struct WriteOptions {
     /// The materials that triangles name; `None` where they name none.
     pub palette: Option<Palette>,
+    /// Whether triangles that close what was open are told apart.
+    pub tag_patches: bool,
+    /// File name of the material library beside an OBJ file, see [`library_name`].
+    pub library: String,
 }
 
 /// A model file being read.
@@ -131,12 +143,12 @@ pub fn create(
     path: &Path,
     format: Format,
     scratch: &Scratch,
-    _options: &WriteOptions,
+    options: &WriteOptions,
 ) -> Result<Sink, IoError> {
     Ok(match format {
-        Format::Obj => Box::new(ObjWriter::create(path, scratch)?),
+        Format::Obj => Box::new(ObjWriter::create(path, scratch, options)?),
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
-        Format::Ply => Box::new(PlyWriter::create(path, scratch)?),
+        Format::Ply => Box::new(PlyWriter::create(path, scratch, options)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
     })
 }
@@ -149,13 +161,13 @@ pub fn reopen(
     path: &Path,
     format: Format,
     scratch: &Scratch,
-    _options: &WriteOptions,
+    options: &WriteOptions,
     state: &SinkState,
 ) -> Result<Sink, IoError> {
     Ok(match format {
-        Format::Obj => Box::new(ObjWriter::reopen(path, scratch, state)?),
+        Format::Obj => Box::new(ObjWriter::reopen(path, scratch, options, state)?),
         Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
-        Format::Ply => Box::new(PlyWriter::reopen(path, scratch, state)?),
+        Format::Ply => Box::new(PlyWriter::reopen(path, scratch, options, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
     })
 }

@@ -13,6 +13,7 @@ use rkyv::ser::sharing::Share;
 use rkyv::util::AlignedVec;
 use rkyv::{Archive, Deserialize, Serialize};
 
+use crate::octree::border::{ArchivedBorder, Border, check_borders};
 use crate::octree::edge_bits::AXIS_EDGES;
 
 /// Most hits that are kept of one edge: first, last, and one in between.
@@ -59,7 +60,7 @@ pub struct SourcePlane {
     pub source: u32,
     /// Part number.
     pub part: u32,
-    /// Material number and transparency bit.
+    /// Material with its bits, as in [`crate::octree::SoupTriangle`].
     pub material: u32,
 }
 
@@ -150,6 +151,8 @@ pub struct SignBrick {
     pub crossings: Vec<Crossing>,
     /// The planes that the crossings use.
     pub planes: Vec<SourcePlane>,
+    /// Where materials may meet, by ascending cell.
+    pub borders: Vec<Border>,
 }
 
 type BrickSerializer<'a> = Strategy<Serializer<AlignedVec, ArenaHandle<'a>, Share>, BoxedError>;
@@ -171,7 +174,8 @@ impl ArchiveSize for HitBrick {
 
 impl ArchiveSize for SignBrick {
     fn archive_bytes(&self) -> usize {
-        8 * self.crossings.len() + 32 * self.planes.len() + ROOT_BYTES
+        let borders = size_of::<ArchivedBorder>() * self.borders.len();
+        8 * self.crossings.len() + 32 * self.planes.len() + borders + ROOT_BYTES
     }
 }
 
@@ -241,6 +245,7 @@ pub fn decode_signs(bytes: &[u8]) -> Result<&ArchivedSignBrick, BrickError> {
             return Err(out_of_range(kind, "plane", plane.into(), planes));
         }
     }
+    check_borders(kind, &brick.borders)?;
     Ok(brick)
 }
 

@@ -99,6 +99,9 @@ pub struct CellBrick {
     /// Offsets of the crossings on the cells' own edges (those that leave their min corner), in
     /// 1/65536 of the edge, cell after cell, axis after axis.
     pub offsets: Vec<u16>,
+    /// What the same crossings are ([`crate::mesh::Surface`]): one for each, or one for all, or
+    /// none where the output names no materials.
+    pub surfaces: Vec<u32>,
     /// Vertices on the faces that the brick owns, by ascending key; numbered after those of cells.
     pub points: Vec<FacePoint>,
     /// Of a brick that may be part of a larger cluster: what that asks of it.
@@ -110,7 +113,8 @@ pub struct CellBrick {
 
 impl ArchiveSize for CellBrick {
     fn archive_bytes(&self) -> usize {
-        let words = self.cells.len() + self.clusters.len() + self.banned.len();
+        let lists = [&self.cells, &self.clusters, &self.banned, &self.surfaces];
+        let words: usize = lists.iter().map(|list| list.len()).sum();
         let halves = self.offsets.len() + self.flagged.len();
         let places = 12 * self.positions.len() + 24 * self.points.len() + 20 * self.reaches.len();
         let facets = self.summary.as_ref().map_or(0, |summary| 80 * summary.facets.len());

@@ -3,6 +3,7 @@
 //! Nothing here knows where bytes lie; nothing here knows a file format or a stage.
 
 mod binned;
+mod border;
 mod brick;
 mod cell_brick;
 mod domain;
@@ -22,6 +23,7 @@ mod touch;
 mod triangle;
 
 pub use binned::{BinEntry, BinSpools, BinWalk, BinnedSoup, SoupBin, write_bins};
+pub use border::{ArchivedBorder, Border, BorderBrick, decode_borders};
 pub use brick::{
     ArchiveSize, ArchivedHitBrick, ArchivedSignBrick, BrickError, Crossing, HitBrick, HitEdge,
     MAX_HITS, NO_PLANE, PATCH, RecordBytes, SignBrick, SourcePlane, decode_hits, decode_signs,
@@ -46,4 +48,4 @@ pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
 pub use soup_edges::{BorderUse, MOST_USES, Panes, SoupEdges, TrianglePair, each_border};
 pub use touch::for_each_touched_brick;
-pub use triangle::{BinTriangle, DropRecord, SoupTriangle, TRANSPARENT};
+pub use triangle::{BinTriangle, CLOSES, DropRecord, SoupTriangle, TRANSPARENT, surface_of};

@@ -2,10 +2,20 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::mesh::Surface;
 use crate::store::Record;
 
 /// Set in [`SoupTriangle::material`] when light passes the material.
 pub const TRANSPARENT: u32 = 1 << 31;
+
+/// Set in [`SoupTriangle::material`] when the triangle closes what was open in the input.
+pub const CLOSES: u32 = 1 << 30;
+
+/// What a crossing on a triangle of this material, with its bits, gives the output.
+#[must_use]
+pub const fn surface_of(material: u32) -> Surface {
+    Surface::new(material & !(TRANSPARENT | CLOSES), material & CLOSES != 0)
+}
 
 /// A triangle of the soup, as spooled by ingest. 88 bytes; see docs/format.md.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -17,7 +27,7 @@ pub struct SoupTriangle {
     pub source: u32,
     /// Part number.
     pub part: u32,
-    /// Material number, and [`TRANSPARENT`].
+    /// Material number, [`TRANSPARENT`], and [`CLOSES`].
     pub material: u32,
     /// For walls and fills: one more than the source number of a triangle that they stand for or
     /// close; 0 for triangles of the input.

@@ -9,6 +9,7 @@ use crate::patch::PatchError;
 use crate::repair::length::Reach;
 use crate::sign::SignError;
 use crate::store::StoreError;
+use crate::transfer::TransferError;
 use crate::verify::VerifyError;
 
 /// Why there is no result.
@@ -72,6 +73,15 @@ pub enum RepairError {
         path: PathBuf,
         /// The work folder.
         folder: PathBuf,
+    },
+    /// The material library beside the output would replace a file that is not ours.
+    #[error(
+        "{path} would be replaced by the materials of the output, and is none of brickmend's; give \
+         the output another name"
+    )]
+    ForeignLibrary {
+        /// The file.
+        path: PathBuf,
     },
     /// Two levels of detail would be the same file.
     #[error("The level {level} is listed twice")]
@@ -147,6 +157,9 @@ pub enum RepairError {
     /// Sign generation failed.
     #[error("Sign generation failed")]
     Sign(#[source] SignError),
+    /// Looking for borders between materials failed.
+    #[error("Looking for borders between materials failed")]
+    Transfer(#[source] TransferError),
     /// Contouring failed.
     #[error("Contouring failed")]
     Contour(#[source] ContourError),
@@ -205,6 +218,7 @@ impl RepairError {
             | Self::DiskBelowEstimate { .. }
             | Self::OutputIsInput { .. }
             | Self::InputInWorkFolder { .. }
+            | Self::ForeignLibrary { .. }
             | Self::SameLevel { .. }
             | Self::NothingToMerge { .. }
             | Self::TooManyTriangles { .. }
@@ -215,11 +229,13 @@ impl RepairError {
             Self::Store(error)
             | Self::Patch(PatchError::Store(error))
             | Self::Sign(SignError::Store(error))
-            | Self::Contour(ContourError::Store(error)) => blame_store(error),
+            | Self::Contour(ContourError::Store(error))
+            | Self::Transfer(TransferError::Store(error)) => blame_store(error),
             Self::ProofFailed { .. }
             | Self::Patch(_)
             | Self::Sign(_)
             | Self::Contour(_)
+            | Self::Transfer(_)
             | Self::ReadBack(_)
             | Self::Threads { .. } => Blame::Internal,
         }
@@ -241,7 +257,8 @@ impl RepairError {
             | Self::ReadBack(IoError::Store(error))
             | Self::Patch(PatchError::Store(error))
             | Self::Sign(SignError::Store(error))
-            | Self::Contour(ContourError::Store(error)) => error,
+            | Self::Contour(ContourError::Store(error))
+            | Self::Transfer(TransferError::Store(error)) => error,
             _ => return None,
         };
         match store {

@@ -82,6 +82,7 @@ pub fn conclude(
         mend: findings.mend.clone(),
         thickened: findings.thickened,
         hidden: findings.hidden.clone(),
+        transfer: run.transfer_report(findings),
         scan: findings.scan,
         patch: findings.patch.clone(),
         votes: findings.flood.votes,

@@ -25,6 +25,7 @@ mod settings;
 mod stages;
 mod standing;
 mod step;
+mod surfaces;
 mod workspace;
 
 pub use deeper::DepthTrial;

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize, Serializer};
 
 use crate::bridge::{MendStats, ThickenStats};
-use crate::contour::ContourStats;
+use crate::contour::{ContourStats, SurfaceDetail};
 use crate::hidden::HiddenStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
 use crate::monitor::{Counter, Gauge, Stage};
@@ -15,6 +15,7 @@ use crate::patch::{Opening, PatchStats};
 use crate::repair::settings::Settings;
 use crate::scan::ScanStats;
 use crate::sign::{SignStats, VoteStats};
+use crate::transfer::BorderStats;
 use crate::verify::Proof;
 
 /// Version of this schema.
@@ -110,6 +111,18 @@ pub struct OutputReport {
     pub caveat: Option<String>,
 }
 
+/// What reached the output besides its shape, and what did not.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct TransferReport {
+    /// What triangles tell of what they are.
+    pub surfaces: SurfaceDetail,
+    /// Counts of borders between materials.
+    #[serde(flatten)]
+    pub borders: BorderStats,
+    /// What the input has and the output does not hold.
+    pub lost: Vec<String>,
+}
+
 /// What a stage took; the caller stamps the seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageReport {
@@ -187,6 +200,8 @@ pub struct Outcome {
     pub thickened: ThickenStats,
     /// What nobody sees.
     pub hidden: HiddenStats,
+    /// What reached the output besides its shape.
+    pub transfer: TransferReport,
     /// Counts of scan, patch and sign.
     pub scan: ScanStats,
     /// See `scan`.

@@ -5,6 +5,7 @@
 use std::collections::BTreeSet;
 
 use crate::bridge::{Mended, ThickenStats, Thickened, thicken};
+use crate::contour::{Method, SurfaceDetail};
 use crate::hidden::{Bodies, HiddenStats, Seen, judge, leave_out};
 use crate::ingest::{Bins, names_of_parts};
 use crate::monitor::Monitor;
@@ -20,6 +21,7 @@ use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, scan};
 use crate::sign::{Exposed, FillRule, Flooded, find_exposed, find_lost, flood};
 use crate::store::{BrickFile, FileState, NoCheckpoints, Resources};
+use crate::transfer::{BorderStats, find_borders, no_borders};
 
 /// What the grid makes of a soup; the hits are among the handles.
 struct Scanned {
@@ -60,9 +62,36 @@ impl Run<'_> {
         let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
         let seen = self.hide(&soup, hits, &scanned, findings, &files, resources)?;
         if let Some(seen) = &seen {
-            scanned = self.scan_again(&seen.soup(bins.spools()), findings, handles, resources)?;
+            soup = seen.soup(bins.spools());
+            scanned = self.scan_again(&soup, findings, handles, resources)?;
         }
+        let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
+        let borders = self.find_borders(&soup, hits, findings, resources)?;
+        scanned.files.extend(hand_on(borders, &mut handles.borders));
         Ok(scanned.files)
+    }
+
+    /// Finds where materials may meet, if the output tells of several.
+    fn find_borders(
+        &self,
+        soup: &BinnedSoup,
+        hits: &BrickFile,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<BrickFile, RepairError> {
+        findings.borders = BorderStats::default();
+        let has_borders = self.surface_detail(findings) != SurfaceDetail::None
+            && (findings.soup().materials > 1 || self.settings.tag_patches)
+            && self.settings.method == Method::Mdc;
+        if !has_borders {
+            return Ok(no_borders(resources)?);
+        }
+        let resources = &Resources { checkpoints: &NoCheckpoints, ..*resources };
+        let options = (self.settings.crease_deg, self.settings.tag_patches);
+        let (borders, stats) = find_borders(soup, hits, findings.domain(), options, resources)
+            .map_err(RepairError::Transfer)?;
+        findings.borders = stats;
+        Ok(borders)
     }
 
     /// Thickens what would be lost.

@@ -19,6 +19,7 @@ use crate::repair::plan::MemoryPlan;
 use crate::repair::settings::{Limits, Settings};
 use crate::repair::stages::{Findings, FinishedLevel, Handles};
 use crate::repair::step::Step;
+use crate::repair::surfaces::keep_libraries;
 use crate::repair::workspace::Workspace;
 use crate::store::{Accountant, Resources, StoreError};
 
@@ -102,6 +103,7 @@ fn run(
     let seen = InputIdentity::of(input)?;
     let key = run_key(input, format, &settings, named, &recording)?;
     let outputs: Vec<PathBuf> = levels.iter().map(|level| level.output.clone()).collect();
+    keep_libraries(format, outputs.iter())?;
     let workspace = Workspace::open(input, output, outputs, limits, key)?;
     let accountant = Accountant::new(limits.max_memory_bytes);
     let run = Run { input, format, settings, levels, limits, plan, recording, accountant, seen };
@@ -279,6 +281,7 @@ impl Run<'_> {
         loop {
             if !workspace.is_in_place() {
                 self.steps(workspace, pool, &mut findings, &mut handles)?;
+                self.put_library(workspace, &findings)?;
                 workspace.put_in_place()?;
                 let output = self.level(&findings).output.display();
                 self.recording.note(&format!("{output} is in place"));

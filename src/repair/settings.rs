@@ -120,6 +120,8 @@ pub struct Settings {
     pub decimate: Reach,
     /// The threshold above is raised until the surface has at most so many triangles.
     pub max_triangles: Option<u64>,
+    /// Whether what closes openings is told apart in the output, where its format can.
+    pub tag_patches: bool,
     /// Refuse broken faces in place of dropping them.
     pub strict: bool,
 }
@@ -139,6 +141,7 @@ impl Default for Settings {
             method: Method::Mdc,
             decimate: Reach::DEFAULT_DECIMATE,
             max_triangles: None,
+            tag_patches: false,
             strict: false,
         }
     }

@@ -12,7 +12,7 @@ use crate::ingest::{
     Bins, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins, read_soup,
     settle,
 };
-use crate::io::{ReadOptions, WriteOptions, check_output};
+use crate::io::{ReadOptions, check_output};
 use crate::mesh::{SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::{Domain, Flips};
@@ -29,6 +29,7 @@ use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
 use crate::sign::{FillRule, FloodStats, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, StoreError};
+use crate::transfer::{BORDERS, BorderStats};
 use crate::verify::{Outward, Proof, ProofOptions, prove};
 
 /// A level of detail whose file is in its place.
@@ -57,6 +58,7 @@ pub struct Findings {
     pub trials: Vec<DepthTrial>,
     /// The grid to begin anew with.
     pub deeper: Option<Domain>,
+    pub borders: BorderStats,
     pub scan: ScanStats,
     pub patch: PatchStats,
     pub flood: FloodStats,
@@ -98,6 +100,7 @@ impl Findings {
 #[derive(Default)]
 pub struct Handles {
     pub(crate) hits: Option<BrickFile>,
+    pub(crate) borders: Option<BrickFile>,
     pub(crate) signs: Option<BrickFile>,
     pub(crate) cells: Option<BrickFile>,
     pub(crate) surface: Option<BrickFile>,
@@ -245,11 +248,12 @@ impl Run<'_> {
         let flips = Flips::open(resources, &files)?;
         let flooded = Flooded::open(resources, &files)?;
         let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
+        let borders = open_bricks(&mut handles.borders, BORDERS, workspace, resources)?;
         let rule = self.settings.fill_rule;
-        let (signs, stats) =
-            assign_signs(hits, &flips, &flooded, rule, resources).map_err(RepairError::Sign)?;
+        let (signs, stats) = assign_signs((hits, Some(borders)), &flips, &flooded, rule, resources)
+            .map_err(RepairError::Sign)?;
         findings.sign = stats;
-        handles.hits = None;
+        (handles.hits, handles.borders) = (None, None);
         if stats.crossings == 0 {
             return Err(self.empty_result(findings));
         }
@@ -279,6 +283,7 @@ impl Run<'_> {
             method: self.settings.method,
             crease_deg: self.settings.crease_deg,
             decimate_cells: decimate_cells.expect("refused when the grid was laid"),
+            surfaces: self.surface_detail(findings),
         }
     }
 
@@ -345,7 +350,7 @@ impl Run<'_> {
         let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
         let start = WriteProgress::noted(resources);
         let (part, scratch) = (workspace.part(), resources.scratch);
-        let write_options = WriteOptions::default();
+        let write_options = self.write_options(workspace, findings)?;
         let sink = match &start {
             Some(noted) => {
                 crate::io::reopen(part, self.format, scratch, &write_options, &noted.sink)

@@ -11,6 +11,7 @@ use crate::monitor::Stage;
 use crate::octree::FLIPS;
 use crate::scan::HITS;
 use crate::sign::{FLOODED, REGIONS, SIGNS};
+use crate::transfer::BORDERS;
 
 /// The output while it is written.
 pub const OUTPUT_PART: &str = "output.part";
@@ -111,12 +112,12 @@ impl Step {
             Self::Scan => &[HITS],
             Self::Patch => &[FLIPS],
             Self::Flood => &[FLOODED, REGIONS],
+            Self::Revise => &[BORDERS],
             Self::Sign => &[SIGNS],
             Self::Place => &[CELLS],
             Self::Separate => &[SURFACE],
             Self::Write => &[OUTPUT_PART],
-            // It makes files of before anew.
-            Self::Revise | Self::Choose | Self::Prove => &[],
+            Self::Choose | Self::Prove => &[],
         }
     }
 
@@ -144,11 +145,11 @@ impl Step {
                 FLOODED,
                 REGIONS,
             ],
-            Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS],
+            Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, BORDERS],
             Self::Choose | Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],
             Self::Write => &[CELLS, SURFACE, MATERIALS],
-            Self::Prove => &[OUTPUT_PART],
+            Self::Prove => &[OUTPUT_PART, MATERIALS],
         }
     }
 

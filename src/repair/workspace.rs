@@ -13,7 +13,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::io::{FACES, check_output};
+use crate::io::{FACES, IoError, check_output};
 use crate::mesh::SinkFile;
 use crate::monitor::Monitor;
 use crate::repair::RepairError;
@@ -308,8 +308,32 @@ impl Workspace {
     }
 
     /// Where the file of the level under way goes.
+    #[must_use]
+    pub fn output_path(&self) -> PathBuf {
+        self.output(&self.manifest()).to_path_buf()
+    }
+
+    /// Where the file of the level under way goes.
     fn output(&self, manifest: &Manifest) -> &Path {
         &self.outputs[finished_levels(manifest).min(self.outputs.len() - 1)]
+    }
+
+    /// Puts a file beside the output, before the output itself: `write` makes it under another name.
+    ///
+    /// # Errors
+    /// As `write`, or the file cannot be renamed.
+    pub fn put_beside(
+        &self,
+        path: &Path,
+        write: impl FnOnce(&Path) -> Result<(), IoError>,
+    ) -> Result<(), RepairError> {
+        let mut hidden = OsString::from(".");
+        hidden.push(path.file_name().unwrap_or_default());
+        hidden.push(".part");
+        let part = path.with_file_name(hidden);
+        write(&part).map_err(RepairError::Output)?;
+        let renamed = std::fs::rename(&part, path);
+        Ok(renamed.map_err(|e| StoreError::io("put in place", path, e))?)
     }
 
     /// Puts the finished output in its place.

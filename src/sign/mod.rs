@@ -166,13 +166,13 @@ pub fn flood(
 /// # Errors
 /// [`SignError`].
 pub fn assign_signs(
-    hits: &BrickFile,
+    (hits, borders): (&BrickFile, Option<&BrickFile>),
     flips: &Flips,
     flooded: &Flooded,
     rule: FillRule,
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
-    let (file, stats) = relabel(hits, flips, flooded, rule, resources)?;
+    let (file, stats) = relabel((hits, borders), flips, flooded, rule, resources)?;
     note_fill(&stats, resources.monitor);
     Ok((file, stats))
 }

@@ -2,9 +2,9 @@
 
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedHitBrick, CornerBits, Crossing, EdgeBits, FlipRecord, Flips, HitEdge, LINES, NO_PLANE,
-    PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_hits, edge_position, encode,
-    find_regions,
+    ArchivedHitBrick, Border, CornerBits, Crossing, EdgeBits, FlipRecord, Flips, HitEdge, LINES,
+    NO_PLANE, PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_borders, decode_hits,
+    edge_position, encode, find_regions,
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
@@ -30,7 +30,7 @@ struct Relabelled {
 /// # Errors
 /// [`SignError`].
 pub fn relabel(
-    hits: &BrickFile,
+    (hits, borders): (&BrickFile, Option<&BrickFile>),
     flips: &Flips,
     flooded: &Flooded,
     rule: FillRule,
@@ -55,7 +55,7 @@ pub fn relabel(
         Workspace::default,
         |space, item| {
             let _brick = resident.hold(1);
-            space.relabel(hits, &item, rule)
+            space.relabel((hits, borders), &item, rule)
         },
         |done: Relabelled| {
             pass.counts.add(&done.stats);
@@ -82,7 +82,7 @@ struct Workspace {
 impl Workspace {
     fn relabel(
         &mut self,
-        hits: &BrickFile,
+        (hits, borders): (&BrickFile, Option<&BrickFile>),
         item: &RelabelItem,
         rule: FillRule,
     ) -> Result<Relabelled, SignError> {
@@ -98,7 +98,13 @@ impl Workspace {
         self.marks.set_differences(&self.signs);
         let mut stats = self.count();
         stats.tip_corners = tip_corners;
-        let brick = self.pick_crossings(record, &item.load.flips, &mut stats);
+        let mut brick = self.pick_crossings(record, &item.load.flips, &mut stats);
+        if let Some(borders) = borders
+            && let Some(number) = borders.find(item.load.brick.0)
+        {
+            let view = borders.view(number)?;
+            brick.borders.extend(decode_borders(&view)?.borders.iter().map(Border::from));
+        }
         stats.bricks = u64::from(!brick.crossings.is_empty());
         let bytes = encode(&brick);
         Ok(Relabelled { key: item.load.brick.0, bytes, stats })

@@ -12,8 +12,8 @@ use crate::store::{Scratch, StoreError, Table};
 /// A place in the hash table: bits of the hash, and the name's number plus one; zero when empty.
 type Slot = [u32; 2];
 
-/// The most names of one dictionary; the top bit of a number is free for its users.
-pub const MOST_NAMES: u64 = 1 << 31;
+/// The most names of one dictionary; the two top bits of a number are free for its users.
+pub const MOST_NAMES: u64 = 1 << 30;
 /// Slots of a dictionary with its first name; always a power of two.
 const FIRST_SLOTS: u64 = 64;
 

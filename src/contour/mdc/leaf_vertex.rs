@@ -12,7 +12,8 @@ use crate::contour::mdc::table::{axis_of_edge, corner_of_edge};
 use crate::contour::mdc::vertices::Workspace;
 use crate::contour::{ContourError, ContourStats};
 use crate::geom::qef::{
-    Attempt, Hit, QefOptions, Waiting, begin, solve, solve_flat, solve_smooth, solve_together,
+    Attempt, Hit, QefOptions, Solution, Waiting, begin, solve, solve_flat, solve_smooth,
+    solve_together,
 };
 use crate::octree::CellBrick;
 
@@ -28,11 +29,21 @@ pub struct WaitingCells {
     places: [([usize; 3], usize); TOGETHER],
 }
 
-/// Crossings of one cell: places about its centre, in cells, and numbers of normals.
+/// Solves for crossings and planes of borders together.
+fn solve_with(hits: &[Hit], planes: &[Hit], options: &QefOptions) -> Solution {
+    let mut all = [Hit { point: DVec3::ZERO, normal: DVec3::ZERO }; 14];
+    let count = hits.len() + planes.len();
+    all[..hits.len()].copy_from_slice(hits);
+    all[hits.len()..count].copy_from_slice(planes);
+    solve(&all[..count], options)
+}
+
+/// Crossings of one cell: places about its centre, in cells, numbers of normals, and surfaces.
 pub(super) struct Around {
     pub(super) count: usize,
     pub(super) points: [DVec3; 12],
     pub(super) normals: [u32; 12],
+    pub(super) surfaces: [u32; 12],
 }
 
 impl Around {
@@ -73,6 +84,11 @@ impl Workspace {
         brick: &mut CellBrick,
         stats: &mut ContourStats,
     ) -> Result<(), ContourError> {
+        if let Some(solution) = self.on_border(at, around) {
+            brick.positions.push(self.to_lattice(at, solution.position));
+            stats.clamped_vertices += u64::from(solution.clamped);
+            return Ok(());
+        }
         let attempt = match around.flat_normal() {
             Some(normal) => {
                 let normal = self.normals[normal as usize];
@@ -124,6 +140,13 @@ impl Workspace {
         Ok(())
     }
 
+    /// The vertex of a component in which materials meet.
+    fn on_border(&self, at: [usize; 3], around: &Around) -> Option<Solution> {
+        let border = self.border_planes(at, around);
+        let hits = &around.hits(&self.normals)[..around.count];
+        (border.count > 0).then(|| solve_with(hits, border.planes(), &self.qef))
+    }
+
     pub(super) fn place_waiting(&mut self, brick: &mut CellBrick, stats: &mut ContourStats) {
         if self.waiting.count == 0 {
             return;
@@ -149,7 +172,9 @@ impl Workspace {
         for &edges in edge_masks {
             let around = self.around(at, edges);
             let hits = &around.hits(&self.normals)[..around.count];
-            let solution = solve(hits, &self.within_crossings(hits));
+            let within = self.within_crossings(hits);
+            let border = self.border_planes(at, &around);
+            let solution = solve_with(hits, border.planes(), &within);
             let position = self.to_lattice(at, solution.position);
             let outward = hits.iter().fold(DVec3::ZERO, |sum, hit| sum + hit.normal);
             let position = self.apart_from(position, at, outward, &brick.positions[first..]);
@@ -179,7 +204,8 @@ impl Workspace {
     /// The crossings on these edges of a cell.
     #[inline]
     pub(super) fn around(&self, at: [usize; 3], edges: u16) -> Around {
-        let mut around = Around { count: 0, points: [DVec3::ZERO; 12], normals: [0; 12] };
+        let mut around =
+            Around { count: 0, points: [DVec3::ZERO; 12], normals: [0; 12], surfaces: [0; 12] };
         let mut left = edges;
         while left != 0 {
             let edge = left.trailing_zeros() as u8;
@@ -192,6 +218,7 @@ impl Workspace {
             point[axis] = crossing.offset - 0.5;
             around.points[around.count] = point;
             around.normals[around.count] = crossing.normal;
+            around.surfaces[around.count] = crossing.surface;
             around.count += 1;
         }
         around

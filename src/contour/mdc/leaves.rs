@@ -57,6 +57,13 @@ impl Workspace {
             };
             self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
         }
+        for border in self.border_planes(at, around).planes() {
+            let point = border.point + low;
+            let offset = border.normal.dot(point);
+            self.leaves.planes.push(CellPlane { normal: border.normal, offset });
+            let plane = (self.leaves.planes.len() - 1) as u32;
+            self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
+        }
     }
 }
 

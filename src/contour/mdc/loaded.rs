@@ -5,6 +5,7 @@
 use crate::contour::ContourError;
 use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of, place_of};
 use crate::contour::mdc::cut_cell::CutCell;
+use crate::mesh::Surface;
 use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
 
 /// A vertex of a brick.
@@ -30,6 +31,8 @@ pub struct Loaded {
     pub offset_firsts: Vec<u32>,
     /// Offsets of the crossings on own edges.
     pub offsets: Vec<u16>,
+    /// What those crossings are, as in the record.
+    pub surfaces: Vec<u32>,
     /// Keys and numbers of the vertices on faces.
     pub points: Vec<(u64, u32)>,
     /// Their positions, as those of vertices.
@@ -186,6 +189,12 @@ impl Loaded {
             }
             offset += own_edges;
         }
+        if is_whole {
+            if record.surfaces.len() > 1 && record.surfaces.len() != record.offsets.len() {
+                return Err(wrong("a surface for every own edge"));
+            }
+            loaded.surfaces.extend(record.surfaces.iter().map(|surface| surface.to_native()));
+        }
         let first = record.positions.len() as u32;
         for (number, point) in (first..).zip(record.points.iter()) {
             loaded.points.push((point.key.to_native(), number));
@@ -201,9 +210,17 @@ impl Loaded {
             vertices: Vec::with_capacity(cells + cells / 8),
             offset_firsts: Vec::with_capacity(cells),
             offsets: Vec::with_capacity(cells + cells / 2),
+            surfaces: Vec::new(),
             points: Vec::new(),
             point_positions: Vec::new(),
         }
+    }
+
+    /// What a crossing is, by its place among the offsets; `None` where nothing is told.
+    #[inline]
+    pub fn surface(&self, offset: usize) -> Option<Surface> {
+        let known = if self.surfaces.len() > 1 { offset } else { 0 };
+        self.surfaces.get(known).map(|bits| Surface::from_bits(*bits))
     }
 
     /// The vertex on a face, if there is one.

@@ -12,6 +12,7 @@ use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};
 use crate::contour::mdc::shape::{Loop, LoopPoint, Shape};
 use crate::contour::mdc::triangulate::{Cut, Quad};
 use crate::contour::{ContourError, ContourStats};
+use crate::mesh::Surface;
 use crate::octree::Domain;
 
 /// The triangles of one brick.
@@ -21,6 +22,8 @@ pub struct BrickTriangles {
     pub indices: Vec<[u32; 3]>,
     /// Positions of the corners in model units; empty unless asked for.
     pub corners: Vec<[[f64; 3]; 3]>,
+    /// What they are; empty where nothing is told.
+    pub surfaces: Vec<Surface>,
     /// Fan points in model units.
     pub fan_points: Vec<[f64; 3]>,
     /// Counts.
@@ -109,13 +112,17 @@ impl<'p> Polygons<'p> {
                 if marks >> axis & 1 == 0 {
                     continue;
                 }
-                let offset = self.nb.own().offsets[next_offset];
+                let own = self.nb.own();
+                let (offset, surface) = (own.offsets[next_offset], own.surface(next_offset));
                 next_offset += 1;
                 if (inner | 1 << axis) == 7 {
                     continue;
                 }
                 let edge = Edge { axis, lower: at.map(|c| c as i32) };
                 self.draw(edge, offset, mask & 1 == 1, &mut out)?;
+                if let Some(surface) = surface {
+                    out.surfaces.resize(out.indices.len(), surface);
+                }
             }
         }
         out.stats.least_angle_deg = out.angles.least_deg();

@@ -13,13 +13,14 @@ use crate::contour::mdc::cell::{FLIPPED_BIT, JOINED_BIT, components_of, number_a
 use crate::contour::mdc::cluster::{ClusterOptions, Clustering, Leaves};
 use crate::contour::mdc::features::{Halo, Place};
 use crate::contour::mdc::leaf_vertex::WaitingCells;
+use crate::contour::mdc::patch_surfaces::PatchSurfaces;
 use crate::contour::mdc::{INSET_UNITS, flags_of};
-use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method};
+use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method, SurfaceDetail};
 use crate::geom::qef::QefOptions;
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedSignBrick, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH, ROWS,
-    RecordBytes, SIDE, SourcePlane, decode_signs, edge_position, encode,
+    ArchivedSignBrick, Border, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH,
+    ROWS, RecordBytes, SIDE, SourcePlane, decode_signs, edge_position, encode, surface_of,
 };
 use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
@@ -81,7 +82,12 @@ pub struct EdgeCrossing {
     pub offset: f64,
     /// Number of its unit normal; 0, which is none, on patches.
     pub normal: u32,
+    /// What it is, for the output; [`NO_SURFACE`] on patches until their rims tell.
+    pub surface: u32,
 }
+
+/// In [`EdgeCrossing::surface`]: not known.
+pub const NO_SURFACE: u32 = u32::MAX;
 
 /// Cells of a brick that the surface passes, in Morton order.
 struct Touched(Box<[u64; SIDE * SIDE * SIDE / 64]>);
@@ -118,6 +124,10 @@ pub struct Workspace {
     /// First crossing of each row of edges.
     row_starts: Vec<u32>,
     crossings: Vec<EdgeCrossing>,
+    pub(super) surfaces: SurfaceDetail,
+    patches: PatchSurfaces,
+    /// Where materials may meet, by ascending cell.
+    pub(super) borders: Vec<Border>,
     /// Planes of the brick, and behind them those of edges that leave it.
     pub(super) planes: Vec<SourcePlane>,
     pub(super) normals: Vec<DVec3>,
@@ -159,6 +169,9 @@ impl Workspace {
             signs: CornerBits::default(),
             row_starts: vec![0; 3 * ROWS],
             crossings: Vec::new(),
+            surfaces: options.surfaces,
+            patches: PatchSurfaces::default(),
+            borders: Vec::new(),
             planes: Vec::new(),
             normals: Vec::new(),
             waiting: WaitingCells::default(),
@@ -210,6 +223,9 @@ impl Workspace {
             brick.drop_covered_reaches();
             brick.summary = clustering.summary(&brick, &self.leaves);
         }
+        if brick.surfaces.iter().all(|surface| *surface == brick.surfaces[0]) {
+            brick.surfaces.truncate(1);
+        }
         stats.crossed_edges += brick.offsets.len() as u64;
         stats.clusters += brick.clusters.len() as u64;
         stats.cut_vertices += brick.positions.len() as u64;
@@ -221,8 +237,11 @@ impl Workspace {
         self.marks.clear();
         self.crossings.clear();
         let mut row = 0;
+        let mut has_patches = false;
         let cell_units = self.cell_units as f64;
         self.planes.clear();
+        self.borders.clear();
+        self.borders.extend(record.borders.iter().map(Border::from));
         self.planes.extend(record.planes.iter().map(SourcePlane::from));
         self.normals.clear();
         self.normals.push(DVec3::ZERO);
@@ -239,13 +258,19 @@ impl Workspace {
             self.crossings.push(if plane & PATCH == 0 {
                 let (axis, at) = edge_position(edge);
                 let offset = self.planes[plane as usize].offset_on_edge(axis, at, cell_units);
-                EdgeCrossing { offset, normal: plane + 1 }
+                let surface = surface_of(self.planes[plane as usize].material).bits();
+                EdgeCrossing { offset, normal: plane + 1, surface }
             } else {
                 let offset = f64::from(plane & 0xffff) / 65536.0;
-                EdgeCrossing { offset, normal: 0 }
+                has_patches = true;
+                EdgeCrossing { offset, normal: 0, surface: NO_SURFACE }
             });
         }
         self.row_starts[row..].fill(self.crossings.len() as u32);
+        if self.surfaces != SurfaceDetail::None && has_patches {
+            let edges = record.crossings.iter().map(|crossing| crossing.edge.to_native());
+            self.patches.find(edges, &mut self.crossings);
+        }
         self.signs.from_marks(&self.marks, record.base_inside);
         if self.clustering.is_some() {
             self.begin_leaves();
@@ -323,8 +348,11 @@ impl Workspace {
         }
         for axis in 0..3 {
             if (mask ^ mask >> (1 << axis)) & 1 == 1 {
-                let offset = self.crossing(axis, at).offset;
+                let EdgeCrossing { offset, surface, .. } = self.crossing(axis, at);
                 brick.offsets.push((offset * 65536.0).clamp(1.0, 65535.0) as u16);
+                if self.surfaces != SurfaceDetail::None {
+                    brick.surfaces.push(self.surfaces.of(surface));
+                }
             }
         }
         brick.cells.push(cell);

@@ -3,6 +3,7 @@
 //! Files up to [`LARGEST_TOBJ_BYTES`] are read by `tobj`. Where that fails or would take too much
 //! memory, and for every larger file, the streaming reader's word stands. Materials come from MTL files beside the model.
 
+mod library;
 mod materials;
 mod normalised;
 mod statements;
@@ -13,6 +14,7 @@ mod tobj_reader;
 mod writer;
 
 use crate::io::input::Input;
+pub use crate::io::obj::library::{LIBRARY_MARK, library_name, write_library};
 use crate::io::obj::stream_reader::ObjStreamReader;
 use crate::io::obj::tobj_reader::{Attempt, TobjReader};
 pub(crate) use crate::io::obj::writer::ObjWriter;

@@ -1,40 +1,75 @@
 //! Writes OBJ text, every coordinate as the shortest text that gives its `f64` back.
 //!
-//! Vertices and faces are written as they come: indices count from the start of the file. Memory:
-//! one buffer.
+//! Vertices and faces are written as they come: indices count from the start of the file. The faces
+//! of one call are grouped by material, and every group names its own. Memory: one buffer, the
+//! triangles of one call, and the names of materials.
 
 use std::path::Path;
 
+use crate::io::WriteOptions;
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
 use crate::io::output::Output;
-use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles};
+use crate::io::output_names::OutputNames;
+use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, Surface};
 use crate::store::Scratch;
 
-/// Writes `v` and `f` lines.
-#[derive(Debug)]
+/// Writes `v`, `usemtl` and `f` lines.
 pub(crate) struct ObjWriter {
     output: Output,
+    /// Names of materials, where triangles have any.
+    names: Option<OutputNames>,
+    order: Vec<(Surface, u32)>,
     text: Vec<u8>,
     vertices: u64,
     triangles: u64,
 }
 
 impl ObjWriter {
-    pub(crate) fn create(path: &Path, scratch: &Scratch) -> Result<Self, IoError> {
+    pub(crate) fn create(
+        path: &Path,
+        scratch: &Scratch,
+        options: &WriteOptions,
+    ) -> Result<Self, IoError> {
         let mut output = Output::create(path, scratch)?;
         output.write(b"# brickmend\n")?;
-        Ok(Self { output, text: Vec::new(), vertices: 0, triangles: 0 })
+        if options.palette.is_some() {
+            output.write(format!("mtllib {}\n", options.library).as_bytes())?;
+        }
+        Self::new(output, scratch, options, &SinkState::default())
     }
 
     /// Goes on where an earlier writer was.
     pub(crate) fn reopen(
         path: &Path,
         scratch: &Scratch,
+        options: &WriteOptions,
         state: &SinkState,
     ) -> Result<Self, IoError> {
-        let output = Output::reopen(path, scratch, &state.output)?;
-        Ok(Self { output, text: Vec::new(), vertices: state.vertices, triangles: state.triangles })
+        Self::new(Output::reopen(path, scratch, &state.output)?, scratch, options, state)
+    }
+
+    fn new(
+        output: Output,
+        scratch: &Scratch,
+        options: &WriteOptions,
+        state: &SinkState,
+    ) -> Result<Self, IoError> {
+        let names = options.palette.as_ref().map(|palette| OutputNames::new(palette, scratch));
+        let SinkState { vertices, triangles, .. } = *state;
+        let (order, text) = (Vec::new(), Vec::new());
+        Ok(Self { output, names: names.transpose()?, order, text, vertices, triangles })
+    }
+
+    fn face(&mut self, triangle: [u32; 3]) -> Result<(), IoError> {
+        self.text.clear();
+        self.text.push(b'f');
+        for index in triangle {
+            self.text.push(b' ');
+            push_count(&mut self.text, u64::from(index) + 1);
+        }
+        self.text.push(b'\n');
+        self.output.write(&self.text)
     }
 }
 
@@ -61,18 +96,27 @@ impl MeshSink for ObjWriter {
     }
 
     fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
-        let SinkTriangles { indices, .. } = *triangles;
+        let SinkTriangles { indices, surfaces, .. } = *triangles;
         self.triangles += indices.len() as u64;
-        for triangle in indices {
-            self.text.clear();
-            self.text.push(b'f');
-            for &index in triangle {
-                self.text.push(b' ');
-                push_count(&mut self.text, u64::from(index) + 1);
-            }
-            self.text.push(b'\n');
-            self.output.write(&self.text)?;
+        if self.names.is_none() {
+            return indices.iter().try_for_each(|&triangle| self.face(triangle));
         }
+        let mut order = std::mem::take(&mut self.order);
+        order.clear();
+        order.extend(surfaces.iter().copied().zip(0..));
+        order.sort_unstable();
+        let mut named = None;
+        for &(surface, triangle) in &order {
+            if named != Some(surface)
+                && let Some(names) = &mut self.names
+            {
+                let line = format!("usemtl {}\n", names.name(surface)?);
+                self.output.write(line.as_bytes())?;
+                named = Some(surface);
+            }
+            self.face(indices[triangle as usize])?;
+        }
+        self.order = order;
         Ok(())
     }
 

@@ -43,6 +43,9 @@ const KEPT_HIT_BYTES: f64 = 4.0;
 const PLANE_BYTES: f64 = 32.0;
 const CROSSING_BYTES: f64 = 8.0;
 const OFFSET_BYTES: f64 = 2.0;
+/// What a crossing is, and what the face of a PLY file says of that: material, colour, patch.
+const SURFACE_BYTES: f64 = 4.0;
+const FACE_SURFACE_BYTES: f64 = 9.0;
 const VERTEX_BYTES: f64 = 12.0;
 const CELL_BYTES: f64 = 4.0;
 /// Of three hits of an edge all are kept, of more three.
@@ -66,6 +69,13 @@ const SAMPLE_BYTES: f64 = 68.0;
 const WALL_BYTES: f64 = 400.0;
 /// Bricks near a sample: most are near to one.
 const NEAR_BRICKS: f64 = 1.6;
+/// A place that the outside touches, and how many of a triangle and brick are kept; what else it
+/// touches; the inside corners of a brick; a piece of an edge that may part two materials.
+const PLACE_BYTES: f64 = 32.0;
+const PLACES: f64 = 2.0;
+const TOUCHED_BYTES: f64 = 8.0;
+const INSIDE_BYTES: f64 = 4104.0;
+const BORDER_PIECE_BYTES: f64 = 28.0;
 /// Hash of a vertex, and its position in the table of the reader.
 const HASH_BYTES: f64 = 8.0;
 const POSITION_BYTES: f64 = 24.0;
@@ -98,6 +108,9 @@ pub struct DiskSteps {
     pub patch: u64,
     /// Regions are joined.
     pub flood: u64,
+    /// Bodies are looked at from outside, borders between materials are found; what is thickened is
+    /// counted with as many triangles as mending may add.
+    pub revise: u64,
     /// Regions become signs.
     pub relabel: u64,
     /// The threshold is chosen: as the next two at one time; 0 without `--max-triangles`.
@@ -116,9 +129,9 @@ impl DiskSteps {
     /// The largest of them.
     #[must_use]
     pub fn peak(&self) -> u64 {
-        let Self { read, bin, settle, mend, scan, patch, flood, .. } = *self;
+        let Self { read, bin, settle, mend, scan, patch, flood, revise, .. } = *self;
         let Self { relabel, choose, place, separate, write, prove, .. } = *self;
-        let before = [read, bin, settle, mend, scan, patch, flood];
+        let before = [read, bin, settle, mend, scan, patch, flood, revise];
         let all = before.into_iter().chain([relabel, choose, place, separate, write, prove]);
         all.max().unwrap_or(0)
     }
@@ -132,6 +145,8 @@ pub struct DiskModel<'e> {
     pub cell: f64,
     pub plan: &'e MemoryPlan,
     pub format: Format,
+    /// Whether triangles of the output have materials.
+    pub has_surfaces: bool,
     /// What the reader of the input spilled.
     pub reader_bytes: u64,
 }
@@ -184,6 +199,14 @@ impl DiskModel<'_> {
             scan: (kept + soup + bins + drops + added + hits) as u64,
             patch: (kept + soup + bins + drops + added + hits + faces + 2.0 * flips) as u64,
             flood: (kept + soup + bins + drops + added + hits + flips + regions) as u64,
+            revise: (kept
+                + soup
+                + bins
+                + 2.0 * (drops + added)
+                + hits
+                + flips
+                + regions
+                + self.revising(pairs)) as u64,
             relabel: (kept + hits + flips + regions + signs) as u64,
             choose: (kept + hits + flips + signs + cells + 2.0 * surface) as u64,
             place: (kept + hits + flips + signs + cells) as u64,
@@ -204,8 +227,11 @@ impl DiskModel<'_> {
         let crossings = BORDER_SHARE * most.crossings as f64;
         let hits = HIT_EDGE_BYTES * edges + KEPT_HIT_BYTES * kept + PLANE_BYTES * pairs.min(kept);
         let signs = CROSSING_BYTES * crossings + PLANE_BYTES * pairs.min(kept).min(crossings);
-        let cells = (VERTEX_BYTES + CELL_BYTES) * vertices + OFFSET_BYTES * most.crossings as f64;
-        let face = face_bytes(self.format, vertices);
+        let (surface, face_surface) =
+            if self.has_surfaces { (SURFACE_BYTES, FACE_SURFACE_BYTES) } else { (0.0, 0.0) };
+        let cells = (VERTEX_BYTES + CELL_BYTES) * vertices
+            + (OFFSET_BYTES + surface) * most.crossings as f64;
+        let face = face_bytes(self.format, vertices) + face_surface;
         let (output, aside) = match self.format {
             Format::Ply => (24.0 * vertices + face * triangles, face * triangles),
             Format::Off => (LINE_BYTES * vertices + face * triangles, face * triangles),
@@ -273,6 +299,16 @@ impl DiskModel<'_> {
         let labels = spilled(LABEL_BYTES * triangles, 0.0, share / 8.0);
         let sheets = spilled(SHEET_BYTES * triangles.min(borders / BORDER_BYTES), 0.0, share / 8.0);
         sorts + borders + 3.0 * labels + sheets + 2.0 * drops
+    }
+
+    /// What is written while bodies and borders are looked at: places and what they belong to, the
+    /// inside corners of bricks, pieces of edges.
+    fn revising(&self, pairs: f64) -> f64 {
+        let share = self.plan.share_bytes as f64;
+        spilled(PLACE_BYTES * PLACES * pairs, 0.0, share / 8.0)
+            + spilled(TOUCHED_BYTES * pairs, 0.0, share / 16.0)
+            + spilled(INSIDE_BYTES * self.counts.bricks as f64, 0.0, share)
+            + if self.has_surfaces { self.brick_file(BORDER_PIECE_BYTES * pairs) } else { 0.0 }
     }
 
     /// What is written while sheets are mended, where the soup is open.

@@ -132,6 +132,7 @@ pub fn estimate(
         cell: grid.cell_size(),
         plan: &plan,
         format,
+        has_surfaces: format.has_materials() && (sums.has_materials || settings.tag_patches),
         reader_bytes,
     };
     let files = disk_model.files();
