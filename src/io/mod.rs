@@ -26,6 +26,7 @@ mod polygon;
 mod stl;
 #[cfg(test)]
 mod tests;
+mod threemf;
 mod words;
 
 use std::path::Path;
@@ -39,6 +40,7 @@ pub use crate::io::output::{FACES, check_output};
 pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
+use crate::io::threemf::ThreeMfReader;
 use crate::mesh::{MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
@@ -56,6 +58,8 @@ pub enum Format {
     Ply,
     /// Geomview's Object File Format, text.
     Off,
+    /// 3D Manufacturing Format, XML in a zip archive.
+    ThreeMf,
 }
 
 /// The number type that a written file holds coordinates in.
@@ -73,7 +77,7 @@ impl Format {
     pub fn coordinates(self) -> CoordinateType {
         match self {
             Self::Stl => CoordinateType::F32,
-            Self::Obj | Self::Ply | Self::Off => CoordinateType::F64,
+            Self::Obj | Self::Ply | Self::Off | Self::ThreeMf => CoordinateType::F64,
         }
     }
 
@@ -117,6 +121,7 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
         Format::Stl => open_stl(input)?,
         Format::Ply => Box::new(PlyReader::open(input, scratch, options)?),
         Format::Off => Box::new(OffReader::open(input, scratch, options)?),
+        Format::ThreeMf => Box::new(ThreeMfReader::open(input, scratch, options)?),
     })
 }
 
@@ -138,6 +143,9 @@ pub fn create(
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
         Format::Ply => Box::new(PlyWriter::create(path, scratch)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
+        Format::ThreeMf => {
+            return Err(IoError::Unsupported { path: path.to_path_buf(), format: "3MF" });
+        }
     })
 }
 
@@ -157,5 +165,8 @@ pub fn reopen(
         Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
         Format::Ply => Box::new(PlyWriter::reopen(path, scratch, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
+        Format::ThreeMf => {
+            return Err(IoError::Unsupported { path: path.to_path_buf(), format: "3MF" });
+        }
     })
 }
