@@ -39,7 +39,7 @@ const HOMES: [(&str, &[&str]); 19] = [
     ("signal_hook::", &["cli/signals.rs", "cli/last_words.rs"]),
     ("indicatif::", &["cli/progress.rs"]),
     ("tobj::", &["io/obj/"]),
-    ("flate2::", &["io/packed/gzip.rs", "io/packed/tests.rs"]),
+    ("flate2::", &["io/packed/gzip.rs", "io/packed/tests.rs", "io/threemf/zip_file.rs"]),
     ("zstd::", &["io/packed/zstandard.rs", "io/packed/tests.rs"]),
     ("zip::", &["io/threemf/"]),
     ("quick_xml::", &["io/threemf/xml.rs"]),

@@ -4,7 +4,7 @@
 //! triangles in file order, or a [`MeshSink`] that takes vertices and triangles.
 //!
 //! Invariant: what is read depends on the file alone, never on the memory granted. Positions are
-//! written exactly (OBJ, PLY and OFF as `f64`, STL rounded to `f32`). Units: model units.
+//! written exactly (OBJ, PLY, OFF and 3MF as `f64`, STL rounded to `f32`). Units: model units.
 //!
 //! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB), the names of parts and materials, and
 //! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`. A writer holds 256 KiB.
@@ -40,7 +40,7 @@ pub use crate::io::output::{FACES, check_output};
 pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
-use crate::io::threemf::ThreeMfReader;
+use crate::io::threemf::{ThreeMfReader, ThreeMfWriter};
 use crate::mesh::{MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
@@ -127,8 +127,8 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
 
 /// Creates a model file, or empties the one that is there.
 ///
-/// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text. Until
-/// [`MeshSink::finish`] the file is not valid.
+/// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text, 3MF as
+/// text that is packed. Until [`MeshSink::finish`] the file is not valid.
 ///
 /// # Errors
 /// The file or a scratch file cannot be created.
@@ -136,16 +136,15 @@ pub fn create(
     path: &Path,
     format: Format,
     scratch: &Scratch,
-    _options: &WriteOptions,
+    options: &WriteOptions,
 ) -> Result<Sink, IoError> {
+    let palette = options.palette.clone();
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::create(path, scratch)?),
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
         Format::Ply => Box::new(PlyWriter::create(path, scratch)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
-        Format::ThreeMf => {
-            return Err(IoError::Unsupported { path: path.to_path_buf(), format: "3MF" });
-        }
+        Format::ThreeMf => Box::new(ThreeMfWriter::create(path, scratch, palette)?),
     })
 }
 
@@ -157,16 +156,15 @@ pub fn reopen(
     path: &Path,
     format: Format,
     scratch: &Scratch,
-    _options: &WriteOptions,
+    options: &WriteOptions,
     state: &SinkState,
 ) -> Result<Sink, IoError> {
+    let palette = options.palette.clone();
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::reopen(path, scratch, state)?),
         Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
         Format::Ply => Box::new(PlyWriter::reopen(path, scratch, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
-        Format::ThreeMf => {
-            return Err(IoError::Unsupported { path: path.to_path_buf(), format: "3MF" });
-        }
+        Format::ThreeMf => Box::new(ThreeMfWriter::reopen(path, scratch, palette, state)?),
     })
 }

@@ -107,7 +107,8 @@ impl GroupParser {
         let (mut most, mut definition) = (f64::NEG_INFINITY, NOTHING);
         tag.attributes(|space, name, value| {
             if (space, name) == (Space::None, "values") {
-                for (&ingredient, word) in self.ingredients.iter().zip(value.split_ascii_whitespace())
+                for (&ingredient, word) in
+                    self.ingredients.iter().zip(value.split_ascii_whitespace())
                 {
                     let share = parse_number(word.as_bytes());
                     let found = || shown(word.as_bytes());

@@ -14,6 +14,9 @@ use crate::io::threemf::transform::Transform;
 use crate::io::threemf::vocabulary::{Element, Space, Unit, is_understood};
 use crate::io::threemf::xml::{Markup, Tag, Where};
 
+/// The longest namespace in a message.
+const LONGEST_SHOWN: usize = 100;
+
 /// A property that triangles have where they state none.
 #[derive(Clone, Copy, Debug, Default)]
 struct DefaultProperty {
@@ -283,7 +286,8 @@ fn check_extension(tag: &Tag, prefix: &str) -> Result<(), IoError> {
     if is_understood(&namespace) {
         return Ok(());
     }
-    let found = format!("{} ({})", shown(prefix.as_bytes()), shown(namespace.as_bytes()));
+    let namespace: String = namespace.chars().take(LONGEST_SHOWN).collect();
+    let found = format!("{} ({namespace:?})", shown(prefix.as_bytes()));
     let expected = "no required extensions but materials, production and triangle sets";
     Err(tag.at.unreadable(expected, &found))
 }

@@ -87,7 +87,11 @@ impl Properties {
     }
 
     /// The definition of a property, if the group has so many.
-    pub(super) fn definition(&mut self, group: Group, index: u64) -> Result<Option<u32>, StoreError> {
+    pub(super) fn definition(
+        &mut self,
+        group: Group,
+        index: u64,
+    ) -> Result<Option<u32>, StoreError> {
         if index < group.count { self.entries.get(group.first + index).map(Some) } else { Ok(None) }
     }
 

@@ -7,7 +7,7 @@
 
 use std::path::PathBuf;
 
-use crate::io::error::{IoError, Place};
+use crate::io::error::{IoError, Place, shown};
 use crate::io::input::Input;
 use crate::io::threemf::archive::{Archive, Members};
 use crate::io::threemf::instances::{Instance, Totals, Walk};
@@ -249,9 +249,11 @@ fn root_model(archive: &mut Archive) -> Result<(String, usize), IoError> {
         }
         Ok(())
     })?;
-    let Some(name) = model else { return Err(refused("a zip archive of something else".to_owned())) };
+    let Some(name) = model else {
+        return Err(refused("a zip archive of something else".to_owned()));
+    };
     match members.get(&part_key(&name)) {
         Some(&member) => Ok((name, member)),
-        None => Err(refused(format!("a way to {name:.80?}, which is not there"))),
+        None => Err(refused(format!("a way to {}, which is not there", shown(name.as_bytes())))),
     }
 }

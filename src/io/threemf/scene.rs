@@ -43,8 +43,7 @@ pub(super) struct Resource {
     is_component: u32,
 }
 
-const KINDS: [Kind; 5] =
-    [Kind::Missing, Kind::Object, Kind::Materials, Kind::Bare, Kind::Foreign];
+const KINDS: [Kind; 5] = [Kind::Missing, Kind::Object, Kind::Materials, Kind::Bare, Kind::Foreign];
 
 impl Resource {
     pub(super) fn kind(&self) -> Kind {
@@ -170,7 +169,9 @@ impl Scene {
     ) -> Result<(), IoError> {
         let before = self.resource(number)?;
         if before.kind() != Kind::Missing {
-            return Err(at.unreadable("a resource with an id of its own", "an id for the second time"));
+            return Err(
+                at.unreadable("a resource with an id of its own", "an id for the second time")
+            );
         }
         let resource = Resource { kind: kind as u32, row, offset: at.offset, ..before };
         Ok(self.resources.set(number.into(), resource)?)
@@ -203,7 +204,7 @@ impl Scene {
             if self.resource(number)?.kind() == Kind::Missing {
                 let key = self.keys.name(number)?;
                 let id = key[4..].iter().rev().fold(0, |sum, &byte| sum << 8 | u32::from(byte));
-                let expected = format!("a reference to a resource, which {id} is not");
+                let expected = format!("resource {id}, which is named here");
                 return Err(self.place(number)?.unreadable(expected, "no such resource"));
             }
         }
@@ -222,7 +223,8 @@ impl Scene {
             Kind::Foreign => Ok(NOTHING),
             Kind::Object | Kind::Missing => {
                 let at = self.place(resource)?;
-                Err(at.unreadable("a group of properties", "an object that a triangle names as its"))
+                Err(at
+                    .unreadable("a group of properties", "an object that a triangle names as its"))
             }
         }
     }

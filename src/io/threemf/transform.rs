@@ -85,7 +85,8 @@ mod tests {
         assert!(Transform::parse("-1 0 0 0 1 0 0 0 1 0 0 0").expect("numbers").mirrors());
         assert!(!Transform::parse("-1 0 0 0 -1 0 0 0 1 0 0 0").expect("numbers").mirrors());
         assert!(!Transform::IDENTITY.mirrors());
-        for text in ["", "1 0 0 0 1 0 0 0 1 0 0", "1 0 0 0 1 0 0 0 1 0 0 0 0", "1 0 0 0 1 0 0 0 1 0 0 x"]
+        for text in
+            ["", "1 0 0 0 1 0 0 0 1 0 0", "1 0 0 0 1 0 0 0 1 0 0 0 0", "1 0 0 0 1 0 0 0 1 0 0 x"]
         {
             assert_eq!(Transform::parse(text), None, "{text}");
         }

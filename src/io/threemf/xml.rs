@@ -200,7 +200,11 @@ impl<R: BufRead> BufRead for Limited<R> {
         let available = self.bytes.fill_buf()?;
         if self.left == 0 && !available.is_empty() {
             let what = "bytes in one tag";
-            return Err(Error::other(IoError::too_many(&self.path, what, MOST_MARKUP_BYTES as u64)));
+            return Err(Error::other(IoError::too_many(
+                &self.path,
+                what,
+                MOST_MARKUP_BYTES as u64,
+            )));
         }
         Ok(&available[..available.len().min(self.left)])
     }

@@ -212,10 +212,9 @@ impl DiskModel<'_> {
             Format::Obj => (LINE_BYTES * vertices + face * triangles, 0.0),
             Format::Stl => (face * triangles, 0.0),
             // Text that is packed to less than half; records aside.
-            Format::ThreeMf => (
-                LINE_BYTES / 2.0 * vertices + face * triangles,
-                25.0 * vertices + 17.0 * triangles,
-            ),
+            Format::ThreeMf => {
+                (LINE_BYTES / 2.0 * vertices + face * triangles, 25.0 * vertices + 17.0 * triangles)
+            }
         };
         FileSizes {
             hits: self.brick_file(hits),
