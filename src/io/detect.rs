@@ -92,9 +92,8 @@ fn judge(
     if let Some(format) = by_content(head, size_bytes) {
         return Ok(format);
     }
-    match extension(name).as_deref() {
-        Some("glb") => return unsupported("GLB"),
-        _ => {}
+    if extension(name).as_deref() == Some("glb") {
+        return unsupported("GLB");
     }
     match format_of_extension(name) {
         Some(Format::ThreeMf) => refused(shown(head)),

@@ -97,7 +97,7 @@ mod tests {
         let record = |i: u32| match i % 3 {
             0 => Record::Vertex([f64::from(i), -0.5, 1e300]),
             1 => Record::Triangle([i, 1, u32::MAX], None),
-            _ => Record::Triangle([i, 1, 2], Some(Surface::new(i, i % 2 == 0))),
+            _ => Record::Triangle([i, 1, 2], Some(Surface::new(i, i.is_multiple_of(2)))),
         };
         let mut bytes = Vec::new();
         for i in 0..100_000 {

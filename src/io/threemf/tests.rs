@@ -305,7 +305,7 @@ fn archives_of_other_things_are_refused_as_such() {
         &[("_rels/.rels", other.as_bytes()), ("3D/a.model", text.as_bytes())],
     ] {
         let error = read_bytes("a.zip", &archive(members, CompressionMethod::Deflated));
-        let error = error.err().expect("refused").to_string();
+        let error = error.expect_err("refused").to_string();
         assert!(error.contains("3MF"), "{error}");
     }
     assert!(matches!(

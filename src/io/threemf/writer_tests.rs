@@ -122,7 +122,7 @@ fn a_sink_goes_on_from_its_state_to_the_same_bytes() {
 fn archives_with_sizes_of_either_length_are_read() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (scratch, path) = (Scratch::new(folder.path()), folder.path().join("a.zip"));
-    let content: Vec<u8> = (0..300_000_u64).map(|i| (i * i >> 7) as u8).collect();
+    let content: Vec<u8> = (0..300_000_u64).map(|i| ((i * i) >> 7) as u8).collect();
     for is_large in [false, true] {
         let mut file = ZipFile::new(Output::create(&path, &scratch).expect("a file"));
         // Headers lie in the head of the file: what is long comes last.
