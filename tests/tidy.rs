@@ -40,7 +40,7 @@ const HOMES: [(&str, &[&str]); 19] = [
     ("indicatif::", &["cli/progress.rs"]),
     ("tobj::", &["io/obj/"]),
     ("flate2::", &["io/packed/gzip.rs", "io/packed/tests.rs", "io/threemf/zip_file.rs"]),
-    ("zstd::", &["io/packed/zstandard.rs", "io/packed/tests.rs"]),
+    ("zstd::", &["io/packed/zstandard.rs", "io/packed/tests.rs", "io/threemf/tests.rs"]),
     ("zip::", &["io/threemf/"]),
     ("quick_xml::", &["io/threemf/xml.rs"]),
     ("exr::", &["report/image_exr.rs", "report/preview/tests.rs"]),

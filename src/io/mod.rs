@@ -7,7 +7,8 @@
 //! written exactly (OBJ, PLY, OFF and 3MF as `f64`, STL rounded to `f32`). Units: model units.
 //!
 //! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB), the names of parts and materials, and
-//! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`. A writer holds 256 KiB.
+//! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`, and of 3MF a tag of up to
+//! 1 MiB. A writer holds 256 KiB.
 
 mod detect;
 mod error;

@@ -225,7 +225,8 @@ fn push_escaped(text: &mut Vec<u8>, name: &str) {
             '<' => text.extend_from_slice(b"&lt;"),
             '>' => text.extend_from_slice(b"&gt;"),
             '"' => text.extend_from_slice(b"&quot;"),
-            '\t' | '\n' | '\r' => text.extend_from_slice(format!("&#{};", c as u32).as_bytes()),
+            // Numbers of characters are XML too, but not to every reader of 3MF.
+            '\t' | '\n' | '\r' => text.push(b' '),
             '\0'..' ' | '\u{fffe}' | '\u{ffff}' => text.extend_from_slice("\u{fffd}".as_bytes()),
             c => text.extend_from_slice(c.encode_utf8(&mut [0; 4]).as_bytes()),
         }
