@@ -40,6 +40,8 @@ enum FormatName {
     Stl,
     Ply,
     Off,
+    #[value(name = "3mf")]
+    ThreeMf,
 }
 
 impl From<FormatName> for Format {
@@ -49,6 +51,7 @@ impl From<FormatName> for Format {
             FormatName::Stl => Self::Stl,
             FormatName::Ply => Self::Ply,
             FormatName::Off => Self::Off,
+            FormatName::ThreeMf => Self::ThreeMf,
         }
     }
 }

@@ -76,11 +76,12 @@ fn judge(
     if head.starts_with(b"glTF") {
         return unsupported("GLB");
     }
+    // Whether the archive holds a model is told when it is opened.
     if head.starts_with(b"PK\x03\x04") {
-        return unsupported("3MF");
+        return Ok(Format::ThreeMf);
     }
     let refused = |found: String| {
-        Err(IoError::unreadable(path, Place::Byte(0), "an OBJ, STL, PLY or OFF file", found))
+        Err(IoError::unreadable(path, Place::Byte(0), "an OBJ, STL, PLY, OFF or 3MF file", found))
     };
     if head.is_empty() {
         return refused("an empty file".to_owned());
@@ -91,12 +92,11 @@ fn judge(
     if let Some(format) = by_content(head, size_bytes) {
         return Ok(format);
     }
-    match extension(name).as_deref() {
-        Some("glb") => return unsupported("GLB"),
-        Some("3mf") => return unsupported("3MF"),
-        _ => {}
+    if extension(name).as_deref() == Some("glb") {
+        return unsupported("GLB");
     }
     match format_of_extension(name) {
+        Some(Format::ThreeMf) => refused(shown(head)),
         Some(format) if format == Format::Stl || !is_mostly_zero(head) => Ok(format),
         _ => refused(shown(head)),
     }
@@ -115,6 +115,7 @@ pub fn format_of_extension(path: &Path) -> Option<Format> {
         "stl" => Some(Format::Stl),
         "ply" => Some(Format::Ply),
         "off" | "coff" | "noff" => Some(Format::Off),
+        "3mf" => Some(Format::ThreeMf),
         _ => None,
     }
 }
@@ -185,6 +186,7 @@ mod tests {
             (b"# c\n\n  v 1 2 3\n", Format::Obj),
             (b"\xef\xbb\xbfv 1 2 3\n", Format::Obj),
             (b"\xef\xbb\xbfsolid a\n", Format::Stl),
+            (b"PK\x03\x04", Format::ThreeMf),
         ] {
             for name in ["a.obj", "a.stl", "a.ply", "a.off", "a"] {
                 assert_eq!(detected(name, content).expect("known"), format, "{name}");
@@ -198,16 +200,14 @@ mod tests {
         assert_eq!(detected("a.stl", &[0; 200]).expect("known"), Format::Stl);
         assert!(matches!(detected("a.txt", b"hello"), Err(IoError::Unreadable { .. })));
         assert!(matches!(detected("a.obj", b""), Err(IoError::Unreadable { .. })));
+        assert!(matches!(detected("a.3mf", b"x"), Err(IoError::Unreadable { .. })));
     }
 
     #[test]
-    fn glb_and_3mf_are_recognised_and_refused() {
-        for (name, content, expected) in [
-            ("a.obj", &b"glTF\x02\0\0\0"[..], "GLB"),
-            ("a", b"PK\x03\x04", "3MF"),
-            ("a.3mf", b"x", "3MF"),
-            ("a.glb", b"x", "GLB"),
-        ] {
+    fn glb_is_recognised_and_refused() {
+        for (name, content, expected) in
+            [("a.obj", &b"glTF\x02\0\0\0"[..], "GLB"), ("a.glb", b"x", "GLB")]
+        {
             let error = detected(name, content).expect_err("refused");
             assert!(matches!(&error, IoError::Unsupported { format, .. } if *format == expected));
             assert!(error.is_input());

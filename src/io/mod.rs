@@ -4,10 +4,11 @@
 //! triangles in file order, or a [`MeshSink`] that takes vertices and triangles.
 //!
 //! Invariant: what is read depends on the file alone, never on the memory granted. Positions are
-//! written exactly (OBJ, PLY and OFF as `f64`, STL rounded to `f32`). Units: model units.
+//! written exactly (OBJ, PLY, OFF and 3MF as `f64`, STL rounded to `f32`). Units: model units.
 //!
 //! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB), the names of parts and materials, and
-//! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`. A writer holds 256 KiB.
+//! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`, and of 3MF a tag of up to
+//! 1 MiB. A writer holds 256 KiB.
 
 mod detect;
 mod error;
@@ -27,6 +28,7 @@ mod polygon;
 mod stl;
 #[cfg(test)]
 mod tests;
+mod threemf;
 mod words;
 
 use std::path::Path;
@@ -41,6 +43,7 @@ pub use crate::io::output::{FACES, check_output};
 pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
+use crate::io::threemf::{ThreeMfReader, ThreeMfWriter};
 use crate::mesh::{MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
@@ -58,6 +61,8 @@ pub enum Format {
     Ply,
     /// Geomview's Object File Format, text.
     Off,
+    /// 3D Manufacturing Format, XML in a zip archive.
+    ThreeMf,
 }
 
 /// The number type that a written file holds coordinates in.
@@ -75,7 +80,7 @@ impl Format {
     pub fn coordinates(self) -> CoordinateType {
         match self {
             Self::Stl => CoordinateType::F32,
-            Self::Obj | Self::Ply | Self::Off => CoordinateType::F64,
+            Self::Obj | Self::Ply | Self::Off | Self::ThreeMf => CoordinateType::F64,
         }
     }
 
@@ -129,13 +134,14 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
         Format::Stl => open_stl(input)?,
         Format::Ply => Box::new(PlyReader::open(input, scratch, options)?),
         Format::Off => Box::new(OffReader::open(input, scratch, options)?),
+        Format::ThreeMf => Box::new(ThreeMfReader::open(input, scratch, options)?),
     })
 }
 
 /// Creates a model file, or empties the one that is there.
 ///
-/// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text. Until
-/// [`MeshSink::finish`] the file is not valid.
+/// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text, 3MF as
+/// text that is packed. Until [`MeshSink::finish`] the file is not valid.
 ///
 /// # Errors
 /// The file or a scratch file cannot be created.
@@ -145,11 +151,13 @@ pub fn create(
     scratch: &Scratch,
     options: &WriteOptions,
 ) -> Result<Sink, IoError> {
+    let palette = options.palette.clone();
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::create(path, scratch, options)?),
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
         Format::Ply => Box::new(PlyWriter::create(path, scratch, options)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
+        Format::ThreeMf => Box::new(ThreeMfWriter::create(path, scratch, palette)?),
     })
 }
 
@@ -164,10 +172,12 @@ pub fn reopen(
     options: &WriteOptions,
     state: &SinkState,
 ) -> Result<Sink, IoError> {
+    let palette = options.palette.clone();
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::reopen(path, scratch, options, state)?),
         Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
         Format::Ply => Box::new(PlyWriter::reopen(path, scratch, options, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
+        Format::ThreeMf => Box::new(ThreeMfWriter::reopen(path, scratch, palette, state)?),
     })
 }

@@ -212,4 +212,22 @@ impl Aside {
     pub(crate) fn state(&mut self) -> Result<SinkFile, IoError> {
         Ok(self.stream.state()?)
     }
+
+    /// Shows everything that was laid aside, block by block.
+    pub(crate) fn for_each_block(
+        &mut self,
+        mut visit: impl FnMut(&[u8]) -> Result<(), IoError>,
+    ) -> Result<(), IoError> {
+        self.stream.flush()?;
+        let mut block = vec![0; BUFFER_BYTES];
+        let mut at = 0;
+        while at < self.stream.written_bytes {
+            let left = self.stream.written_bytes - at;
+            let part = &mut block[..left.min(BUFFER_BYTES as u64) as usize];
+            self.stream.file.read_at(part, at)?;
+            visit(part)?;
+            at += part.len() as u64;
+        }
+        Ok(())
+    }
 }

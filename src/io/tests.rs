@@ -108,11 +108,12 @@ fn write(path: &Path, format: Format, positions: &[[f64; 3]], triangles: &[[u32;
     assert_eq!(stats.file.bytes, std::fs::metadata(path).expect("the file").len());
 }
 
-const FORMATS: [(Format, &str); 4] = [
+const FORMATS: [(Format, &str); 5] = [
     (Format::Obj, "a.obj"),
     (Format::Stl, "a.stl"),
     (Format::Ply, "a.ply"),
     (Format::Off, "a.off"),
+    (Format::ThreeMf, "a.3mf"),
 ];
 
 fn finite() -> impl Strategy<Value = f64> {

@@ -19,10 +19,10 @@ use crate::io::input::Input;
 use crate::store::Scratch;
 
 /// Content of this size is unpacked however small the packed file is.
-const HARMLESS_BYTES: u64 = 64 << 20;
+pub(crate) const HARMLESS_BYTES: u64 = 64 << 20;
 /// Beyond [`HARMLESS_BYTES`], content that takes more than this many times the bytes of the packed
 /// file read so far is refused. Models stay far below: text about 4, regular grids about 50.
-const MOST_RATIO: u64 = 256;
+pub(crate) const MOST_RATIO: u64 = 256;
 /// More packed bytes than this without one byte of content are no model: empty members, or a name
 /// in a header that does not end.
 const MOST_IDLE_BYTES: u64 = 8 << 20;

@@ -237,6 +237,10 @@ impl DiskModel<'_> {
             Format::Off => (LINE_BYTES * vertices + face * triangles, face * triangles),
             Format::Obj => (LINE_BYTES * vertices + face * triangles, 0.0),
             Format::Stl => (face * triangles, 0.0),
+            // Text that is packed to less than half; records aside.
+            Format::ThreeMf => {
+                (LINE_BYTES / 2.0 * vertices + face * triangles, 25.0 * vertices + 17.0 * triangles)
+            }
         };
         FileSizes {
             hits: self.brick_file(hits),
@@ -360,5 +364,6 @@ fn face_bytes(format: Format, vertices: f64) -> f64 {
         Format::Ply => 13.0,
         Format::Stl => 50.0,
         Format::Obj | Format::Off => 3.0 * digits + FACE_LINE_BYTES,
+        Format::ThreeMf => (3.0 * digits + 40.0) / 2.0,
     }
 }

@@ -1,0 +1,259 @@
+//! Reads a 3MF package: all of its model first, then every object in every place where it stands.
+//!
+//! Each object in its place is a part. Vertices are numbered on from object to object. Numbers are
+//! in the unit of the file. Without an item to build, all objects of the root are delivered.
+//! Memory: that of [`Scene`], and an eighth of the share for the names of parts; while the model is
+//! parsed a tag and a block besides.
+
+use std::path::PathBuf;
+
+use crate::io::error::{IoError, Place, shown};
+use crate::io::input::Input;
+use crate::io::threemf::archive::{Archive, Members};
+use crate::io::threemf::instances::{Instance, Totals, Walk};
+use crate::io::threemf::model::ModelParser;
+use crate::io::threemf::part_name::part_key;
+use crate::io::threemf::properties::NOTHING;
+use crate::io::threemf::scene::{Face, Scene};
+use crate::io::threemf::vocabulary::{MODEL_RELATIONSHIP, Space, Unit};
+use crate::io::threemf::xml::{Markup, read_xml};
+use crate::io::{BATCH_TRIANGLES, ReadOptions};
+use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::store::{Scratch, Table};
+
+/// Where a package says what it is.
+const RELATIONSHIPS_PART: &str = "_rels/.rels";
+
+/// Reads a 3MF file in batches.
+pub(crate) struct ThreeMfReader {
+    path: PathBuf,
+    /// Until the model is parsed.
+    archive: Option<Box<Archive>>,
+    scene: Scene,
+    walk: Walk,
+    totals: Totals,
+    current: Option<Current>,
+    /// Vertices and faces of the instances before the current one.
+    vertices: u64,
+    faces: u64,
+    /// By part: the number of its name.
+    part_names: Table<u32>,
+    /// The last property, and the number of its material.
+    last: Option<([u32; 2], u32)>,
+    discarded: Discarded,
+    bytes_read: u64,
+}
+
+/// The instance that is being delivered.
+struct Current {
+    instance: Instance,
+    mirrors: bool,
+    next: u64,
+    part: Option<u32>,
+}
+
+impl ThreeMfReader {
+    pub(crate) fn open(
+        input: Input,
+        scratch: &Scratch,
+        options: &ReadOptions,
+    ) -> Result<Self, IoError> {
+        let path = input.path().to_path_buf();
+        let mut scene = Scene::new(&path, scratch, options.share_bytes)?;
+        let mut archive = Archive::open(input)?;
+        let (name, member) = root_model(&mut archive)?;
+        scene.part(&name, member);
+        Ok(Self {
+            path,
+            archive: Some(Box::new(archive)),
+            scene,
+            walk: Walk::default(),
+            totals: Totals::default(),
+            current: None,
+            vertices: 0,
+            faces: 0,
+            part_names: Table::new(scratch, options.share_bytes / 8),
+            last: None,
+            discarded: Discarded::default(),
+            bytes_read: 0,
+        })
+    }
+
+    /// What the numbers of the file are. Known once something was delivered.
+    #[cfg_attr(not(test), expect(dead_code, reason = "sizes are told in model units so far"))]
+    pub(super) fn unit(&self) -> Unit {
+        self.scene.unit
+    }
+
+    /// Parses all parts of the model and looks at every instance once.
+    fn parse(&mut self, mut archive: Archive) -> Result<(), IoError> {
+        let members = Members::clone(archive.members());
+        let mut number = 0;
+        // The root names the others.
+        while let Some(part) = self.scene.parts.get(number).cloned() {
+            let mut parser = ModelParser::new(&mut self.scene, &members, number as u32);
+            let content = archive.member(part.member)?;
+            read_xml(content, &self.path, &part.name, |markup| parser.take(&markup))?;
+            number += 1;
+        }
+        self.bytes_read = archive.into_bytes_read();
+        self.scene.check()?;
+        self.totals = Totals::of(&mut self.scene, &self.path)?;
+        Ok(())
+    }
+
+    /// Goes on to the next instance; `false` behind the last one.
+    fn advance(&mut self) -> Result<bool, IoError> {
+        if let Some(Current { instance, .. }) = self.current.take() {
+            self.vertices += instance.object.vertices;
+            self.faces += instance.object.triangles;
+        }
+        let next = self.walk.next(&mut self.scene, &self.path)?;
+        self.current = next.map(|instance| Current {
+            mirrors: instance.transform.mirrors(),
+            instance,
+            next: 0,
+            part: None,
+        });
+        Ok(self.current.is_some())
+    }
+
+    /// Delivers the next face of the current instance.
+    fn deliver(&mut self, batch: &mut TriangleBatch) -> Result<(), IoError> {
+        let Some(current) = &mut self.current else { return Ok(()) };
+        let object = current.instance.object;
+        let polygon = (self.faces + current.next) as u32;
+        let face = self.scene.faces.get(object.first_triangle + current.next)?;
+        current.next += 1;
+        if face.vertices.iter().any(|&vertex| u64::from(vertex) >= object.vertices) {
+            self.discarded.wild_index_faces += 1;
+            return Ok(());
+        }
+        let mut vertices = face.vertices.map(u64::from);
+        if current.mirrors {
+            vertices.swap(1, 2);
+        }
+        let mut corners = [[0.0; 3]; 3];
+        for (corner, vertex) in corners.iter_mut().zip(vertices) {
+            let position = self.scene.vertices.get(object.first_vertex + vertex)?;
+            *corner = current.instance.transform.apply(position);
+        }
+        let part = match current.part {
+            Some(part) => part,
+            None => {
+                let part = self.part_names.len() as u32;
+                self.part_names.push(object.name)?;
+                current.part = Some(part);
+                part
+            }
+        };
+        let material = self.material_of(&face)?;
+        batch.push(corners, part, material, polygon);
+        batch.indices.push(vertices.map(|vertex| (self.vertices + vertex) as u32));
+        Ok(())
+    }
+
+    fn material_of(&mut self, face: &Face) -> Result<u32, IoError> {
+        let property = [face.resource, face.property];
+        if let Some((last, material)) = self.last
+            && last == property
+        {
+            return Ok(material);
+        }
+        let definition = match face.resource.checked_sub(1) {
+            Some(resource) => self.scene.definition(resource, face.property)?,
+            None => NOTHING,
+        };
+        let material = self.scene.properties.material(definition)?;
+        self.last = Some((property, material));
+        Ok(material)
+    }
+}
+
+impl MeshSource for ThreeMfReader {
+    type Error = IoError;
+
+    fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
+        batch.clear();
+        if let Some(archive) = self.archive.take() {
+            self.parse(*archive)?;
+        }
+        while batch.len() < BATCH_TRIANGLES {
+            let is_open = |c: &Current| c.next < c.instance.object.triangles;
+            if self.current.as_ref().is_some_and(is_open) {
+                self.deliver(batch)?;
+            } else if !self.advance()? {
+                break;
+            }
+        }
+        Ok(!batch.is_empty())
+    }
+
+    fn part_count(&self) -> u64 {
+        self.part_names.len()
+    }
+
+    fn material_count(&self) -> u64 {
+        self.scene.properties.material_count()
+    }
+
+    fn part(&mut self, number: u32) -> Result<Part, IoError> {
+        let name = self.part_names.get(number.into())?;
+        let name = self.scene.names.name(name)?;
+        Ok(Part { name: String::from_utf8_lossy(&name).into_owned() })
+    }
+
+    fn material(&mut self, number: u32) -> Result<Material, IoError> {
+        self.scene.properties.describe(number)
+    }
+
+    fn discarded(&self) -> Discarded {
+        self.discarded
+    }
+
+    fn bytes_read(&self) -> u64 {
+        self.bytes_read
+    }
+
+    fn vertex_count(&self) -> Option<u64> {
+        Some(self.totals.vertices)
+    }
+}
+
+/// Name and member of the model that the package is there for.
+fn root_model(archive: &mut Archive) -> Result<(String, usize), IoError> {
+    const EXPECTED: &str = "a 3MF package, whose _rels/.rels leads to a model";
+    let (path, members) = (archive.path().to_path_buf(), Members::clone(archive.members()));
+    let refused = |found: String| IoError::unreadable(&path, Place::Byte(0), EXPECTED, found);
+    let Some(&relationships) = members.get(RELATIONSHIPS_PART) else {
+        return Err(refused("a zip archive without one".to_owned()));
+    };
+    let mut model = None;
+    let content = archive.member(relationships)?;
+    read_xml(content, &path, RELATIONSHIPS_PART, |markup| {
+        let Markup::Start(tag) = markup else { return Ok(()) };
+        if tag.name() != (Space::Relationships, "Relationship") {
+            return Ok(());
+        }
+        let (mut is_model, mut target) = (false, None);
+        tag.attributes(|_, name, value| {
+            match name {
+                "Type" => is_model = value == MODEL_RELATIONSHIP,
+                "Target" => target = Some(value.to_owned()),
+                _ => {}
+            }
+            Ok(())
+        })?;
+        if is_model && model.is_none() {
+            model = target;
+        }
+        Ok(())
+    })?;
+    let Some(name) = model else {
+        return Err(refused("a zip archive of something else".to_owned()));
+    };
+    match members.get(&part_key(&name)) {
+        Some(&member) => Ok((name, member)),
+        None => Err(refused(format!("a way to {}, which is not there", shown(name.as_bytes())))),
+    }
+}

@@ -1,0 +1,117 @@
+//! Vertices and triangles that wait for the end of a file, in the order in which they came.
+//!
+//! A record is its tag (one byte), then numbers with their lowest byte first: three `f64` of a
+//! vertex; three `u32` of a triangle, and a fourth where its surface is known. Memory: a record.
+
+use crate::io::error::IoError;
+use crate::io::output::Aside;
+use crate::mesh::Surface;
+
+const VERTEX: u8 = 0;
+const TRIANGLE: u8 = 1;
+const SURFACE: u8 = 2;
+
+/// What waits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum Record {
+    Vertex([f64; 3]),
+    Triangle([u32; 3], Option<Surface>),
+}
+
+impl Record {
+    /// Appends its bytes.
+    pub(super) fn push(&self, bytes: &mut Vec<u8>) {
+        match *self {
+            Self::Vertex(position) => {
+                bytes.push(VERTEX);
+                bytes.extend(position.iter().flat_map(|number| number.to_le_bytes()));
+            }
+            Self::Triangle(indices, surface) => {
+                bytes.push(if surface.is_some() { SURFACE } else { TRIANGLE });
+                let numbers = indices.into_iter().chain(surface.map(Surface::bits));
+                bytes.extend(numbers.flat_map(u32::to_le_bytes));
+            }
+        }
+    }
+
+    /// The record at the front of `bytes` and how long it is, if it is whole.
+    fn read(bytes: &[u8]) -> Option<(Self, usize)> {
+        let index = |number: usize| {
+            let at = 1 + 4 * number;
+            Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?))
+        };
+        let coordinate = |axis: usize| {
+            let at = 1 + 8 * axis;
+            Some(f64::from_le_bytes(bytes.get(at..at + 8)?.try_into().ok()?))
+        };
+        let triangle = || Some([index(0)?, index(1)?, index(2)?]);
+        match *bytes.first()? {
+            VERTEX => {
+                let position = [coordinate(0)?, coordinate(1)?, coordinate(2)?];
+                Some((Self::Vertex(position), 25))
+            }
+            TRIANGLE => Some((Self::Triangle(triangle()?, None), 13)),
+            _ => {
+                let surface = Surface::from_bits(index(3)?);
+                Some((Self::Triangle(triangle()?, Some(surface)), 17))
+            }
+        }
+    }
+}
+
+/// Shows everything that was laid aside.
+pub(super) fn for_each_record(
+    aside: &mut Aside,
+    mut visit: impl FnMut(Record) -> Result<(), IoError>,
+) -> Result<(), IoError> {
+    // The start of a record whose end is in the next block.
+    let mut carried = Vec::new();
+    aside.for_each_block(|block| {
+        let mut rest = block;
+        while !carried.is_empty() && !rest.is_empty() {
+            carried.push(rest[0]);
+            rest = &rest[1..];
+            if let Some((record, _)) = Record::read(&carried) {
+                carried.clear();
+                visit(record)?;
+            }
+        }
+        while let Some((record, length)) = Record::read(rest) {
+            rest = &rest[length..];
+            visit(record)?;
+        }
+        carried.extend_from_slice(rest);
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::store::Scratch;
+
+    #[test]
+    fn records_come_back_across_blocks() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut aside = Aside::create(&Scratch::new(folder.path())).expect("a file");
+        let record = |i: u32| match i % 3 {
+            0 => Record::Vertex([f64::from(i), -0.5, 1e300]),
+            1 => Record::Triangle([i, 1, u32::MAX], None),
+            _ => Record::Triangle([i, 1, 2], Some(Surface::new(i, i.is_multiple_of(2)))),
+        };
+        let mut bytes = Vec::new();
+        for i in 0..100_000 {
+            bytes.clear();
+            record(i).push(&mut bytes);
+            aside.write(&bytes).expect("written");
+        }
+        let mut next = 0;
+        let shown = for_each_record(&mut aside, |found| {
+            assert_eq!(found, record(next));
+            next += 1;
+            Ok(())
+        });
+        shown.expect("read");
+        assert_eq!(next, 100_000);
+    }
+}
