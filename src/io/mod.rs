@@ -87,7 +87,7 @@ impl Format {
     /// Whether triangles have materials.
     #[must_use]
     pub fn has_materials(self) -> bool {
-        matches!(self, Self::Obj | Self::Ply)
+        matches!(self, Self::Obj | Self::Ply | Self::ThreeMf)
     }
 
     /// Whether triangles name vertices by number.
