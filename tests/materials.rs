@@ -17,6 +17,9 @@ use crate::support::run::{Workshop, at_depth};
 
 const LIBRARY: &str = "newmtl oak\nKd 0.5 0.3 0.1\nnewmtl wool\nKd 0.1 0.2 0.8\nd 1\n";
 
+/// Formats that hold materials.
+const EXTENSIONS: [&str; 3] = ["obj", "ply", "3mf"];
+
 /// Triangles by the names of their materials.
 type Painted = BTreeMap<String, Vec<Corners>>;
 
@@ -115,7 +118,8 @@ fn assert_painted_alike(soup: &[Corners], label: &str, settings: &Settings) {
         let text = text_of(&library, &[("oak", &oak), ("wool", &wool)]);
         let input = workshop.write_text("obj", &text);
         let limits = Limits::default();
-        let repaired = workshop.repair(&input, "obj", settings, &limits).expect("a result");
+        let extension = EXTENSIONS[pose % EXTENSIONS.len()];
+        let repaired = workshop.repair(&input, extension, settings, &limits).expect("a result");
         let cell = repaired.outcome.grid.cell_size();
         let painted = read(&repaired.path);
         assert_eq!(painted.keys().collect::<Vec<_>>(), ["oak", "wool"], "{label} {pose}");

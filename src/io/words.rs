@@ -163,6 +163,15 @@ impl Words {
         Ok(name.trim_ascii().to_vec())
     }
 
+    /// The rest of the line, left where it is; `None` if it is longer than a name may be.
+    pub(crate) fn short_rest(&mut self) -> Result<Option<String>, IoError> {
+        let bytes = self.input.look_ahead(LONGEST_NAME_BYTES)?;
+        let bytes = &bytes[..bytes.len().min(LONGEST_NAME_BYTES)];
+        let length = bytes.iter().position(|&b| b == b'\n');
+        let line = length.map(|length| &bytes[..length]);
+        Ok(line.map(|line| String::from_utf8_lossy(line.trim_ascii()).into_owned()))
+    }
+
     /// Goes to the start of the next line; `false` when there is none.
     pub(crate) fn skip_line(&mut self) -> Result<bool, IoError> {
         self.skip_to_line_end()?;

@@ -4,6 +4,7 @@
 //! only as they are read.
 
 use crate::io::error::{IoError, shown};
+use crate::io::ply::materials::FaceMaterials;
 use crate::io::words::Words;
 
 /// The most elements, and the most properties of all elements together.
@@ -71,6 +72,10 @@ pub(crate) enum Role {
     Coordinate(usize),
     /// Red, green, blue or alpha.
     Colour(usize),
+    /// The material of a face.
+    Material,
+    /// Whether a face closes what was open.
+    Patch,
     /// The corners of a face or a strip.
     Indices,
     /// Passed over.
@@ -123,8 +128,8 @@ pub(crate) struct Header {
 }
 
 impl Header {
-    /// Reads the lines from `ply` to `end_header`.
-    pub(crate) fn read(words: &mut Words) -> Result<Self, IoError> {
+    /// Reads the lines from `ply` to `end_header`; comments go to `materials`.
+    pub(crate) fn read(words: &mut Words, materials: &mut FaceMaterials) -> Result<Self, IoError> {
         if words.word_on_line()? != Some(b"ply") {
             return Err(words.unreadable("ply", "something else"));
         }
@@ -136,7 +141,12 @@ impl Header {
                 return Err(words.unreadable("end_header", "the end of the file"));
             }
             match words.word_on_line()? {
-                None | Some(b"comment" | b"obj_info") => {}
+                None | Some(b"obj_info") => {}
+                Some(b"comment") => {
+                    if let Some(comment) = words.short_rest()? {
+                        materials.declare(&comment)?;
+                    }
+                }
                 Some(b"format") => encoding = Some(read_encoding(words)?),
                 Some(b"element") => {
                     elements.push(read_element(words)?);
@@ -174,6 +184,10 @@ impl Header {
     /// The place of the first element with faces or strips.
     pub(crate) fn first_surface(&self) -> Option<usize> {
         self.elements.iter().position(|element| matches!(element.kind, Kind::Face | Kind::Strips))
+    }
+
+    pub(crate) fn has_materials(&self) -> bool {
+        self.elements.iter().any(|e| e.kind == Kind::Face && e.has(Role::Material))
     }
 
     pub(crate) fn has_colours(&self) -> bool {
@@ -278,10 +292,12 @@ fn role(kind: Kind, is_list: bool, name: &[u8]) -> Role {
         (Kind::Vertex, false, b"x") => Role::Coordinate(0),
         (Kind::Vertex, false, b"y") => Role::Coordinate(1),
         (Kind::Vertex, false, b"z") => Role::Coordinate(2),
-        (Kind::Vertex, false, b"red" | b"diffuse_red") => Role::Colour(0),
-        (Kind::Vertex, false, b"green" | b"diffuse_green") => Role::Colour(1),
-        (Kind::Vertex, false, b"blue" | b"diffuse_blue") => Role::Colour(2),
-        (Kind::Vertex, false, b"alpha" | b"diffuse_alpha") => Role::Colour(3),
+        (Kind::Vertex | Kind::Face, false, b"red" | b"diffuse_red") => Role::Colour(0),
+        (Kind::Vertex | Kind::Face, false, b"green" | b"diffuse_green") => Role::Colour(1),
+        (Kind::Vertex | Kind::Face, false, b"blue" | b"diffuse_blue") => Role::Colour(2),
+        (Kind::Vertex | Kind::Face, false, b"alpha" | b"diffuse_alpha") => Role::Colour(3),
+        (Kind::Face, false, b"material_index") => Role::Material,
+        (Kind::Face, false, b"patch") => Role::Patch,
         (Kind::Face | Kind::Strips, true, b"vertex_indices" | b"vertex_index") => Role::Indices,
         _ => Role::Other,
     }

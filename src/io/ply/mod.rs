@@ -2,6 +2,7 @@
 
 mod body;
 mod header;
+mod materials;
 mod plain;
 mod reader;
 mod strip;

@@ -8,7 +8,8 @@
 use crate::io::error::IoError;
 use crate::io::input::Input;
 use crate::io::ply::body::Body;
-use crate::io::ply::header::{Header, Kind, Role, Scalar};
+use crate::io::ply::header::{Header, Kind, Property, Role, Scalar};
+use crate::io::ply::materials::{FaceMaterials, FaceSurface};
 use crate::io::ply::plain;
 use crate::io::ply::strip::{Step, Strip};
 use crate::io::polygon::{
@@ -16,7 +17,7 @@ use crate::io::polygon::{
 };
 use crate::io::words::{Dialect, Words};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
-use crate::mesh::{Discarded, MeshSource, TriangleBatch};
+use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
 use crate::store::{Scratch, Table};
 
 /// Reads a PLY file in batches.
@@ -26,6 +27,9 @@ pub(crate) struct PlyReader {
     vertices_known: bool,
     positions: Table<[f64; 3]>,
     colours: Option<Table<[u8; 4]>>,
+    /// Where faces have any, and what the one under way says of its own.
+    materials: Option<FaceMaterials>,
+    face: FaceSurface,
     /// The element that is being read, how many of it were, and how far the next one is.
     element: usize,
     entry: u64,
@@ -46,15 +50,17 @@ impl PlyReader {
         options: &ReadOptions,
     ) -> Result<Self, IoError> {
         let mut words = Words::new(input, Dialect::Plain);
-        let header = Header::read(&mut words)?;
+        let mut materials = FaceMaterials::new(scratch, options.share_bytes / 8);
+        let header = Header::read(&mut words, &mut materials)?;
         let body = Body::new(words, header.encoding);
         let has_colours = header.has_colours();
         let columns = Columns { indices: true, uvs: false, colours: has_colours };
         Ok(Self {
-            header,
             body,
             vertices_known: false,
             positions: Table::new(scratch, options.share_bytes / 2),
+            materials: header.has_materials().then_some(materials),
+            face: FaceSurface::default(),
             colours: has_colours.then(|| Table::new(scratch, options.share_bytes / 8)),
             element: 0,
             entry: 0,
@@ -66,6 +72,7 @@ impl PlyReader {
             polygons: 0,
             polygon: PolygonCutter::new(columns),
             discarded: Discarded::default(),
+            header,
         })
     }
 
@@ -117,7 +124,7 @@ impl PlyReader {
             match property.role {
                 Role::Coordinate(axis) => position[axis] = number,
                 Role::Colour(channel) => colour[channel] = property.scalar.channel(number),
-                Role::Indices | Role::Other => {}
+                Role::Indices | Role::Material | Role::Patch | Role::Other => {}
             }
         }
         if self.positions.len() >= u64::from(u32::MAX) {
@@ -167,6 +174,10 @@ impl PlyReader {
                     return Ok(());
                 }
                 (Role::Indices, _) => self.read_corners(property.scalar, count)?,
+                (Role::Material | Role::Patch | Role::Colour(_), Kind::Face) => {
+                    let number = self.body.number(property.scalar)?;
+                    self.note(property, number);
+                }
                 _ => self.body.skip(property.scalar, count)?,
             }
         }
@@ -175,8 +186,27 @@ impl PlyReader {
         if kind == Kind::Face { self.close_face() } else { Ok(()) }
     }
 
+    /// Notes what the face under way says of its material.
+    fn note(&mut self, property: Property, number: f64) {
+        let face = &mut self.face;
+        match property.role {
+            Role::Material => face.index = number as u32,
+            Role::Patch => face.is_patch = number != 0.0,
+            Role::Colour(channel) => {
+                let colour = face.colour.get_or_insert(WHITE);
+                colour[channel] = property.scalar.channel(number);
+            }
+            Role::Coordinate(_) | Role::Indices | Role::Other => {}
+        }
+    }
+
     fn close_face(&mut self) -> Result<(), IoError> {
         let polygon = self.next_polygon()?;
+        let face = std::mem::take(&mut self.face);
+        let material = match &mut self.materials {
+            Some(materials) => materials.number(self.body.input().path(), face)?,
+            None => 0,
+        };
         if std::mem::take(&mut self.is_wild) {
             self.discarded.wild_index_faces += 1;
             self.polygon.clear();
@@ -184,7 +214,7 @@ impl PlyReader {
             self.discarded.short_faces += 1;
             self.polygon.clear();
         } else {
-            self.polygon.close(Owner { part: 0, material: 0, polygon });
+            self.polygon.close(Owner { part: 0, material, polygon });
         }
         Ok(())
     }
@@ -259,6 +289,17 @@ impl MeshSource for PlyReader {
             }
         }
         Ok(!batch.is_empty())
+    }
+
+    fn material_count(&self) -> u64 {
+        self.materials.as_ref().map_or(1, |materials| materials.count().max(1))
+    }
+
+    fn material(&mut self, number: u32) -> Result<Material, IoError> {
+        match &mut self.materials {
+            Some(materials) if u64::from(number) < materials.count() => materials.get(number),
+            _ => Ok(Material::default()),
+        }
     }
 
     fn discarded(&self) -> Discarded {
