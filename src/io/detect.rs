@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::io::Format;
 use crate::io::error::{IoError, Place, shown};
+use crate::io::gltf::MAGIC;
 use crate::io::input::Input;
 use crate::io::off::is_off_keyword;
 use crate::io::packed::{Packing, Unpacker, content_name};
@@ -73,14 +74,11 @@ fn judge(
     size_bytes: Option<u64>,
 ) -> Result<Format, IoError> {
     let unsupported = |format| Err(IoError::Unsupported { path: path.to_path_buf(), format });
-    if head.starts_with(b"glTF") {
-        return unsupported("GLB");
-    }
     if head.starts_with(b"PK\x03\x04") {
         return unsupported("3MF");
     }
     let refused = |found: String| {
-        Err(IoError::unreadable(path, Place::Byte(0), "an OBJ, STL, PLY or OFF file", found))
+        Err(IoError::unreadable(path, Place::Byte(0), "an OBJ, STL, PLY, OFF or glTF file", found))
     };
     if head.is_empty() {
         return refused("an empty file".to_owned());
@@ -92,7 +90,6 @@ fn judge(
         return Ok(format);
     }
     match extension(name).as_deref() {
-        Some("glb") => return unsupported("GLB"),
         Some("3mf") => return unsupported("3MF"),
         _ => {}
     }
@@ -115,6 +112,7 @@ pub fn format_of_extension(path: &Path) -> Option<Format> {
         "stl" => Some(Format::Stl),
         "ply" => Some(Format::Ply),
         "off" | "coff" | "noff" => Some(Format::Off),
+        "glb" | "gltf" => Some(Format::Glb),
         _ => None,
     }
 }
@@ -124,6 +122,9 @@ fn extension(path: &Path) -> Option<String> {
 }
 
 fn by_content(head: &[u8], size_bytes: Option<u64>) -> Option<Format> {
+    if head.starts_with(MAGIC) {
+        return Some(Format::Glb);
+    }
     let first_line = head.split(|&b| b == b'\n').next().unwrap_or_default();
     if first_line.trim_ascii_end() == b"ply" {
         return Some(Format::Ply);
@@ -139,6 +140,10 @@ fn by_content(head: &[u8], size_bytes: Option<u64>) -> Option<Format> {
         return None;
     }
     let head = head.strip_prefix(MARK).unwrap_or(head);
+    // No other format is JSON.
+    if head.trim_ascii_start().starts_with(b"{") {
+        return Some(Format::Glb);
+    }
     let keyword = first_word_outside_of_comments(head)?;
     if keyword.eq_ignore_ascii_case(b"solid") {
         Some(Format::Stl)
@@ -185,6 +190,8 @@ mod tests {
             (b"# c\n\n  v 1 2 3\n", Format::Obj),
             (b"\xef\xbb\xbfv 1 2 3\n", Format::Obj),
             (b"\xef\xbb\xbfsolid a\n", Format::Stl),
+            (b"glTF\x02\0\0\0", Format::Glb),
+            (b"\xef\xbb\xbf \n{\"asset\":{}}", Format::Glb),
         ] {
             for name in ["a.obj", "a.stl", "a.ply", "a.off", "a"] {
                 assert_eq!(detected(name, content).expect("known"), format, "{name}");
@@ -201,13 +208,9 @@ mod tests {
     }
 
     #[test]
-    fn glb_and_3mf_are_recognised_and_refused() {
-        for (name, content, expected) in [
-            ("a.obj", &b"glTF\x02\0\0\0"[..], "GLB"),
-            ("a", b"PK\x03\x04", "3MF"),
-            ("a.3mf", b"x", "3MF"),
-            ("a.glb", b"x", "GLB"),
-        ] {
+    fn packages_are_recognised_and_refused() {
+        for (name, content, expected) in [("a", &b"PK\x03\x04"[..], "3MF"), ("a.3mf", b"x", "3MF")]
+        {
             let error = detected(name, content).expect_err("refused");
             assert!(matches!(&error, IoError::Unsupported { format, .. } if *format == expected));
             assert!(error.is_input());

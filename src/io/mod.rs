@@ -9,8 +9,10 @@
 //! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB), the names of parts and materials, and
 //! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`. A writer holds 256 KiB.
 
+mod beside;
 mod detect;
 mod error;
+mod gltf;
 #[cfg(test)]
 mod hostile_tests;
 mod input;
@@ -33,6 +35,7 @@ use std::path::Path;
 use crate::io::detect::open_model;
 pub use crate::io::detect::{detect, format_of_extension};
 pub use crate::io::error::{IoError, Place};
+use crate::io::gltf::GltfReader;
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
 pub use crate::io::output::{FACES, check_output};
@@ -56,6 +59,8 @@ pub enum Format {
     Ply,
     /// Geomview's Object File Format, text.
     Off,
+    /// glTF 2.0: GLB, also read as JSON with its buffers beside it.
+    Glb,
 }
 
 /// The number type that a written file holds coordinates in.
@@ -72,7 +77,7 @@ impl Format {
     #[must_use]
     pub fn coordinates(self) -> CoordinateType {
         match self {
-            Self::Stl => CoordinateType::F32,
+            Self::Stl | Self::Glb => CoordinateType::F32,
             Self::Obj | Self::Ply | Self::Off => CoordinateType::F64,
         }
     }
@@ -117,6 +122,7 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
         Format::Stl => open_stl(input)?,
         Format::Ply => Box::new(PlyReader::open(input, scratch, options)?),
         Format::Off => Box::new(OffReader::open(input, scratch, options)?),
+        Format::Glb => Box::new(GltfReader::open(input, scratch, options)?),
     })
 }
 
@@ -138,6 +144,7 @@ pub fn create(
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
         Format::Ply => Box::new(PlyWriter::create(path, scratch)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
+        Format::Glb => return Err(IoError::Unsupported { path: path.into(), format: "GLB" }),
     })
 }
 
@@ -157,5 +164,6 @@ pub fn reopen(
         Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
         Format::Ply => Box::new(PlyWriter::reopen(path, scratch, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
+        Format::Glb => return Err(IoError::Unsupported { path: path.into(), format: "GLB" }),
     })
 }

@@ -211,6 +211,7 @@ impl DiskModel<'_> {
             Format::Off => (LINE_BYTES * vertices + face * triangles, face * triangles),
             Format::Obj => (LINE_BYTES * vertices + face * triangles, 0.0),
             Format::Stl => (face * triangles, 0.0),
+            Format::Glb => (12.0 * vertices + face * triangles, face * triangles),
         };
         FileSizes {
             hits: self.brick_file(hits),
@@ -322,6 +323,7 @@ fn face_bytes(format: Format, vertices: f64) -> f64 {
     let digits = vertices.max(1.0).log10().floor() + 1.0;
     match format {
         Format::Ply => 13.0,
+        Format::Glb => 12.0,
         Format::Stl => 50.0,
         Format::Obj | Format::Off => 3.0 * digits + FACE_LINE_BYTES,
     }

@@ -1,0 +1,24 @@
+//! glTF 2.0: a scene of nodes in JSON, with its numbers in a GLB chunk, in files or in the JSON.
+
+mod accessor;
+mod base64;
+mod buffers;
+mod container;
+mod draco;
+#[cfg(test)]
+mod hostile_tests;
+mod load;
+mod materials;
+mod model;
+mod reader;
+mod scene;
+mod schema;
+mod stream;
+#[cfg(test)]
+mod tests;
+mod text;
+mod transform;
+mod triangles;
+
+pub(crate) use crate::io::gltf::container::MAGIC;
+pub(crate) use crate::io::gltf::reader::GltfReader;
