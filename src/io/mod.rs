@@ -4,10 +4,11 @@
 //! triangles in file order, or a [`MeshSink`] that takes vertices and triangles.
 //!
 //! Invariant: what is read depends on the file alone, never on the memory granted. Positions are
-//! written exactly (OBJ, PLY and OFF as `f64`, STL rounded to `f32`). Units: model units.
+//! written exactly (OBJ, PLY and OFF as `f64`, STL and GLB rounded to `f32`). Units: model units.
 //!
-//! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB), the names of parts and materials, and
-//! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`. A writer holds 256 KiB.
+//! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB, 512 KiB for glTF), and the largest
+//! polygon; OBJ files up to 4 MiB are held whole by `tobj`, primitives that Draco has compressed
+//! are decoded whole. A writer holds 256 KiB for each file; that of GLB 4 MiB more in the end.
 
 mod beside;
 mod detect;
@@ -35,10 +36,10 @@ use std::path::Path;
 use crate::io::detect::open_model;
 pub use crate::io::detect::{detect, format_of_extension};
 pub use crate::io::error::{IoError, Place};
-use crate::io::gltf::GltfReader;
+use crate::io::gltf::{GlbWriter, GltfReader};
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
-pub use crate::io::output::{FACES, check_output};
+pub use crate::io::output::{ASIDE, check_output};
 pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
@@ -128,7 +129,8 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
 
 /// Creates a model file, or empties the one that is there.
 ///
-/// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text. Until
+/// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text, glTF as
+/// GLB. Until
 /// [`MeshSink::finish`] the file is not valid.
 ///
 /// # Errors
@@ -137,14 +139,14 @@ pub fn create(
     path: &Path,
     format: Format,
     scratch: &Scratch,
-    _options: &WriteOptions,
+    options: &WriteOptions,
 ) -> Result<Sink, IoError> {
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::create(path, scratch)?),
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
         Format::Ply => Box::new(PlyWriter::create(path, scratch)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
-        Format::Glb => return Err(IoError::Unsupported { path: path.into(), format: "GLB" }),
+        Format::Glb => Box::new(GlbWriter::create(path, scratch, options)?),
     })
 }
 
@@ -156,7 +158,7 @@ pub fn reopen(
     path: &Path,
     format: Format,
     scratch: &Scratch,
-    _options: &WriteOptions,
+    options: &WriteOptions,
     state: &SinkState,
 ) -> Result<Sink, IoError> {
     Ok(match format {
@@ -164,6 +166,6 @@ pub fn reopen(
         Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
         Format::Ply => Box::new(PlyWriter::reopen(path, scratch, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
-        Format::Glb => return Err(IoError::Unsupported { path: path.into(), format: "GLB" }),
+        Format::Glb => Box::new(GlbWriter::reopen(path, scratch, options, state)?),
     })
 }

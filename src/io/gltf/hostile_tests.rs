@@ -3,7 +3,7 @@
 use proptest::prelude::*;
 use serde_json::{Value, json};
 
-use crate::io::gltf::tests::{glb, read, read_file, refused, square};
+use crate::io::gltf::tests::{add, glb, read, read_file, refused, square};
 use crate::io::tests::read_bytes;
 use crate::io::{IoError, Place};
 
@@ -70,9 +70,9 @@ fn circles_and_second_parents_are_refused() {
     assert!(told.contains("node 1:"), "{told}");
     // Deep is no circle, and no stack overflows.
     let (mut json, binary) = square();
-    let nodes: Vec<_> = (1..100_000).map(|i| json!({"children": [i]})).collect();
+    let nodes: Vec<_> = (1..=100_000).map(|i| json!({"children": [i]})).collect();
     json["nodes"] = json!(nodes);
-    json["nodes"][99_999] = json!({"mesh": 0});
+    add(&mut json, "nodes", json!({"mesh": 0}));
     assert_eq!(read(&json, &binary).expect("readable").batch.len(), 2);
 }
 
@@ -101,7 +101,7 @@ fn sparse_indices_ascend_within_their_accessor() {
         let told = refused(|json, binary| {
             binary.extend(indices);
             json["buffers"][0]["byteLength"] = json!(62);
-            json["bufferViews"][2] = json!({"buffer": 0, "byteOffset": 60, "byteLength": 2});
+            add(json, "bufferViews", json!({"buffer": 0, "byteOffset": 60, "byteLength": 2}));
             json["accessors"][0]["sparse"] = json!({"count": 2,
                 "indices": {"bufferView": 2, "componentType": 5121}, "values": {"bufferView": 0}});
         });

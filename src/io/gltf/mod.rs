@@ -4,7 +4,10 @@ mod accessor;
 mod base64;
 mod buffers;
 mod container;
+mod document;
 mod draco;
+#[cfg(test)]
+mod draco_tests;
 #[cfg(test)]
 mod hostile_tests;
 mod load;
@@ -19,6 +22,12 @@ mod tests;
 mod text;
 mod transform;
 mod triangles;
+mod writer;
+#[cfg(test)]
+mod writer_tests;
 
 pub(crate) use crate::io::gltf::container::MAGIC;
 pub(crate) use crate::io::gltf::reader::GltfReader;
+#[cfg(test)]
+pub(crate) use crate::io::gltf::tests::gltf_square;
+pub(crate) use crate::io::gltf::writer::GlbWriter;

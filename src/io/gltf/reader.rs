@@ -94,8 +94,13 @@ impl GltfReader {
             visit.next += 1;
             let map = visit.map;
             let stream = Stream::open(&mut self.model, &mut self.buffers, number, map)?;
-            if let Some(stream) = stream {
-                self.begin(stream)?;
+            match stream {
+                Some(stream) => self.begin(stream)?,
+                // The vertices of points and lines are in the file too.
+                None => match self.model.primitives.get(number)?.position {
+                    NONE => {}
+                    position => drop(self.number_vertices(position)?),
+                },
             }
             return Ok(true);
         }
@@ -137,19 +142,24 @@ impl GltfReader {
         Ok(true)
     }
 
-    /// Numbers the vertices of a primitive and counts its bytes.
-    fn begin(&mut self, mut stream: Stream) -> Result<(), IoError> {
-        let mut position = self.model.accessor(stream.accessors[0])?;
-        if position.scope != self.scope {
-            position.scope = self.scope;
-            position.first_vertex = self.vertices as u32;
-            self.vertices = self.vertices.saturating_add(position.count);
+    /// The number in the file of the first vertex of an accessor, at the present place.
+    fn number_vertices(&mut self, accessor: u32) -> Result<u32, IoError> {
+        let mut record = self.model.accessor(accessor)?;
+        if record.scope != self.scope {
+            record.scope = self.scope;
+            record.first_vertex = self.vertices as u32;
+            self.vertices = self.vertices.saturating_add(record.count);
             if self.vertices > u64::from(u32::MAX) {
                 return Err(IoError::too_many(&self.model.path, "vertices", u32::MAX.into()));
             }
-            self.model.accessors.set(stream.accessors[0].into(), position)?;
+            self.model.accessors.set(accessor.into(), record)?;
         }
-        stream.first_vertex = position.first_vertex;
+        Ok(record.first_vertex)
+    }
+
+    /// Numbers the vertices of a primitive and counts its bytes.
+    fn begin(&mut self, mut stream: Stream) -> Result<(), IoError> {
+        stream.first_vertex = self.number_vertices(stream.accessors[0])?;
         for (accessor, field) in stream.accessors.into_iter().zip(stream.fields()) {
             let Some(field) = field.filter(|_| accessor != NONE && !stream.is_packed) else {
                 continue;

@@ -54,8 +54,19 @@ pub(crate) fn square() -> (Value, Vec<u8>) {
     (json, binary)
 }
 
+/// The square as a file.
+pub(crate) fn gltf_square() -> Vec<u8> {
+    let (json, binary) = square();
+    glb(&json, &binary)
+}
+
 pub(crate) fn read(json: &Value, binary: &[u8]) -> Result<Content, IoError> {
     read_bytes("a.glb", &glb(json, binary))
+}
+
+/// Appends an object to a list of the file.
+pub(crate) fn add(json: &mut Value, list: &str, object: Value) {
+    json[list].as_array_mut().expect("a list").push(object);
 }
 
 /// What a change makes of the square.
@@ -177,7 +188,7 @@ fn whole_numbers_strides_and_sparse_values_are_positions_too() {
     let content = changed(|json, binary| {
         binary.extend([1_u8, 3, 0, 0]);
         json["buffers"][0]["byteLength"] = json!(64);
-        json["bufferViews"][2] = json!({"buffer": 0, "byteOffset": 60, "byteLength": 2});
+        add(json, "bufferViews", json!({"buffer": 0, "byteOffset": 60, "byteLength": 2}));
         json["accessors"][0] = json!({"componentType": 5126, "count": 4, "type": "VEC3",
             "sparse": {"count": 2, "indices": {"bufferView": 2, "componentType": 5121},
                        "values": {"bufferView": 0, "byteOffset": 12}}});
@@ -192,13 +203,23 @@ fn colours_and_texture_coordinates_are_there_for_all_or_none() {
         binary.extend([255_u8, 0, 51, 0].repeat(4));
         binary.extend(floats(&[0.25, 0.5].repeat(4)));
         json["buffers"][0]["byteLength"] = json!(108);
-        json["bufferViews"][2] =
-            json!({"buffer": 0, "byteOffset": 60, "byteLength": 16, "byteStride": 4});
-        json["bufferViews"][3] = json!({"buffer": 0, "byteOffset": 76, "byteLength": 32});
-        json["accessors"][2] = json!({"bufferView": 2, "componentType": 5121, "normalized": true,
-            "count": 4, "type": "VEC3"});
-        json["accessors"][3] =
-            json!({"bufferView": 3, "componentType": 5126, "count": 4, "type": "VEC2"});
+        add(
+            json,
+            "bufferViews",
+            json!({"buffer": 0, "byteOffset": 60, "byteLength": 16, "byteStride": 4}),
+        );
+        add(json, "bufferViews", json!({"buffer": 0, "byteOffset": 76, "byteLength": 32}));
+        add(
+            json,
+            "accessors",
+            json!({"bufferView": 2, "componentType": 5121, "normalized": true,
+            "count": 4, "type": "VEC3"}),
+        );
+        add(
+            json,
+            "accessors",
+            json!({"bufferView": 3, "componentType": 5126, "count": 4, "type": "VEC2"}),
+        );
         let primitives = json["meshes"][0]["primitives"].as_array_mut().expect("a list");
         let mut other = primitives[0].clone();
         other["attributes"]["COLOR_0"] = json!(2);
@@ -261,10 +282,14 @@ fn copies_of_a_mesh_are_delivered_one_by_one() {
         binary.extend(floats(&[0.0, 0.0, 1.0, 0.0, 0.0, 2.0]));
         binary.extend(floats(&[1.0, 1.0, 1.0, 1.0, -1.0, 1.0]));
         json["buffers"][0]["byteLength"] = json!(108);
-        json["bufferViews"][2] = json!({"buffer": 0, "byteOffset": 60, "byteLength": 48});
-        for (at, offset) in [(2, 0), (3, 24)] {
-            json["accessors"][at] = json!({"bufferView": 2, "byteOffset": offset,
-                "componentType": 5126, "count": 2, "type": "VEC3"});
+        add(json, "bufferViews", json!({"buffer": 0, "byteOffset": 60, "byteLength": 48}));
+        for offset in [0, 24] {
+            add(
+                json,
+                "accessors",
+                json!({"bufferView": 2, "byteOffset": offset,
+                "componentType": 5126, "count": 2, "type": "VEC3"}),
+            );
         }
         json["nodes"][0]["extensions"] = json!({"EXT_mesh_gpu_instancing":
             {"attributes": {"TRANSLATION": 2, "SCALE": 3}}});

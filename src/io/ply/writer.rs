@@ -6,7 +6,7 @@
 use std::path::Path;
 
 use crate::io::error::IoError;
-use crate::io::output::{Aside, Output};
+use crate::io::output::{Aside, FACES, Output};
 use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use crate::store::Scratch;
 
@@ -30,7 +30,7 @@ pub(crate) struct PlyWriter {
 
 impl PlyWriter {
     pub(crate) fn create(path: &Path, scratch: &Scratch) -> Result<Self, IoError> {
-        let faces = Aside::create(scratch)?;
+        let faces = Aside::create(scratch, FACES)?;
         let mut output = Output::create(path, scratch)?;
         output.write(&header(0, 0))?;
         Ok(Self { output, faces, vertices: 0, triangles: 0 })
@@ -43,7 +43,7 @@ impl PlyWriter {
         state: &SinkState,
     ) -> Result<Self, IoError> {
         let output = Output::reopen(path, scratch, &state.output)?;
-        let faces = Aside::reopen(scratch, &state.aside)?;
+        let faces = Aside::reopen(scratch, FACES, &state.aside)?;
         let SinkState { vertices, triangles, .. } = *state;
         Ok(Self { output, faces, vertices, triangles })
     }
@@ -90,7 +90,8 @@ impl MeshSink for PlyWriter {
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
         let (output, aside) = (self.output.state()?, self.faces.state()?);
-        Ok(SinkState { vertices: self.vertices, triangles: self.triangles, output, aside })
+        let Self { vertices, triangles, .. } = *self;
+        Ok(SinkState { vertices, triangles, output, aside, ..SinkState::default() })
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
