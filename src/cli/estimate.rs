@@ -17,7 +17,7 @@ use crate::cli::signals::Stop;
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
 pub struct EstimateArguments {
-    /// The model: OBJ, STL, PLY or OFF, told by content.
+    /// The model: OBJ, STL, PLY, OFF or glTF, told by content.
     input: PathBuf,
     /// Where the repaired model would go; its extension is its format. Nothing is written.
     #[arg(short, long, value_name = "FILE")]
@@ -40,6 +40,7 @@ enum FormatName {
     Stl,
     Ply,
     Off,
+    Glb,
 }
 
 impl From<FormatName> for Format {
@@ -49,6 +50,7 @@ impl From<FormatName> for Format {
             FormatName::Stl => Self::Stl,
             FormatName::Ply => Self::Ply,
             FormatName::Off => Self::Off,
+            FormatName::Glb => Self::Glb,
         }
     }
 }

@@ -89,9 +89,8 @@ fn judge(
     if let Some(format) = by_content(head, size_bytes) {
         return Ok(format);
     }
-    match extension(name).as_deref() {
-        Some("3mf") => return unsupported("3MF"),
-        _ => {}
+    if extension(name).as_deref() == Some("3mf") {
+        return unsupported("3MF");
     }
     match format_of_extension(name) {
         Some(format) if format == Format::Stl || !is_mostly_zero(head) => Ok(format),
@@ -112,7 +111,8 @@ pub fn format_of_extension(path: &Path) -> Option<Format> {
         "stl" => Some(Format::Stl),
         "ply" => Some(Format::Ply),
         "off" | "coff" | "noff" => Some(Format::Off),
-        "glb" | "gltf" => Some(Format::Glb),
+        // Text with the extension `.gltf` is told by its content; it is not written.
+        "glb" => Some(Format::Glb),
         _ => None,
     }
 }

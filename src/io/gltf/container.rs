@@ -25,21 +25,28 @@ pub(crate) struct Chunks {
     pub(crate) is_text: bool,
 }
 
+/// Type and content of a chunk.
+struct Chunk {
+    kind: [u8; 4],
+    content: Range<u64>,
+}
+
 /// Finds the chunks; other ones are passed over.
 pub(crate) fn find_chunks(input: &mut Input) -> Result<Chunks, IoError> {
     if !input.look_ahead(MAGIC.len())?.starts_with(MAGIC) {
         return Ok(Chunks { json: 0..input.size_bytes(), binary: None, is_text: true });
     }
     let end = read_header(input)?;
-    let Some((JSON, json)) = next_chunk(input, HEADER_BYTES, end)? else {
-        return Err(unreadable(input, HEADER_BYTES, "a JSON chunk", "none"));
+    let json = match next_chunk(input, HEADER_BYTES, end)? {
+        Some(chunk) if chunk.kind == *JSON => chunk.content,
+        _ => return Err(unreadable(input, HEADER_BYTES, "a JSON chunk", "none")),
     };
     let mut at = json.end;
-    while let Some((kind, chunk)) = next_chunk(input, at, end)? {
-        if kind == BINARY {
-            return Ok(Chunks { json, binary: Some(chunk), is_text: false });
+    while let Some(chunk) = next_chunk(input, at, end)? {
+        if chunk.kind == *BINARY {
+            return Ok(Chunks { json, binary: Some(chunk.content), is_text: false });
         }
-        at = chunk.end;
+        at = chunk.content.end;
     }
     Ok(Chunks { json, binary: None, is_text: false })
 }
@@ -60,14 +67,8 @@ fn read_header(input: &mut Input) -> Result<u64, IoError> {
     Ok(size_bytes)
 }
 
-/// Type and content of the chunk at `at`; `None` where there is no room for one.
-fn next_chunk(
-    input: &mut Input,
-    at: u64,
-    end: u64,
-) -> Result<Option<(&'static [u8; 4], Range<u64>)>, IoError> {
-    /// Passed over.
-    const OTHER: &[u8; 4] = b"\0\0\0\0";
+/// The chunk at `at`; `None` where there is no room for one.
+fn next_chunk(input: &mut Input, at: u64, end: u64) -> Result<Option<Chunk>, IoError> {
     let start = at + CHUNK_HEADER_BYTES;
     if start > end {
         return Ok(None);
@@ -81,8 +82,7 @@ fn next_chunk(
         let expected = format!("a chunk of at most {} bytes", end - start);
         return Err(unreadable(input, at, &expected, &found));
     }
-    let kind = [JSON, BINARY].into_iter().find(|known| **known == kind).unwrap_or(OTHER);
-    Ok(Some((kind, start..start + size_bytes)))
+    Ok(Some(Chunk { kind, content: start..start + size_bytes }))
 }
 
 fn unreadable(input: &Input, offset: u64, expected: &str, found: &str) -> IoError {

@@ -40,7 +40,8 @@ fn accessors_that_leave_their_buffers_are_refused_by_number() {
 
 #[test]
 fn numbers_of_what_is_not_there_are_refused() {
-    let cases: [(fn(&mut Value), &str); 8] = [
+    type Change = fn(&mut Value);
+    let cases: [(Change, &str); 8] = [
         (|json| json["scene"] = json!(7), "scene 7:"),
         (|json| json["scenes"][0]["nodes"] = json!([1]), "node 1:"),
         (|json| json["nodes"][0]["mesh"] = json!(2), "mesh 2:"),

@@ -12,7 +12,7 @@ use crate::io::gltf::buffers::Buffers;
 use crate::io::gltf::container::find_chunks;
 use crate::io::gltf::load::load;
 use crate::io::gltf::materials;
-use crate::io::gltf::model::{Model, NONE};
+use crate::io::gltf::model::{MeshRecord, Model, NONE};
 use crate::io::gltf::scene::{Copies, Walk};
 use crate::io::gltf::stream::Stream;
 use crate::io::gltf::transform::Affine;
@@ -25,6 +25,7 @@ use crate::store::{Scratch, Table};
 /// The node whose mesh is being delivered.
 struct Visit {
     node: u32,
+    mesh: u32,
     /// Its number among the parts, once a triangle was delivered.
     part: Option<u32>,
     copies: Copies,
@@ -33,7 +34,7 @@ struct Visit {
     first: u64,
     end: u64,
     next: u64,
-    /// Triangles of this copy so far, also wild ones.
+    /// Triangles of this copy that were delivered.
     triangles: u64,
 }
 
@@ -104,14 +105,19 @@ impl GltfReader {
             }
             return Ok(true);
         }
-        // Copies of nothing are nothing.
-        let is_empty = visit.triangles == 0;
+        if visit.triangles == 0 {
+            // Nothing stays nothing, wherever it is put: it is looked at once.
+            let mesh = self.model.mesh(visit.mesh)?;
+            self.model.meshes.set(visit.mesh.into(), MeshRecord { count: 0, ..mesh })?;
+            self.visit = None;
+            return Ok(true);
+        }
         match visit.copies.next(&mut self.model, &mut self.buffers)? {
-            Some(map) if !is_empty => {
+            Some(map) => {
                 self.scope += 1;
                 (visit.map, visit.next, visit.triangles) = (map, visit.first, 0);
             }
-            _ => self.visit = None,
+            None => self.visit = None,
         }
         Ok(true)
     }
@@ -129,6 +135,7 @@ impl GltfReader {
             self.scope += 1;
             let visit = Visit {
                 node: number,
+                mesh: node.mesh,
                 part: None,
                 copies,
                 map,
@@ -173,9 +180,6 @@ impl GltfReader {
         if stream.has_rest {
             self.discarded.short_faces += 1;
         }
-        if let Some(visit) = &mut self.visit {
-            visit.triangles += stream.count;
-        }
         self.stream = Some(stream);
         Ok(())
     }
@@ -190,7 +194,7 @@ impl GltfReader {
                 self.discarded.wild_index_faces += 1;
                 continue;
             };
-            let part = self.part_number()?;
+            let part = self.next_part()?;
             let material = self.material_number(stream.material)?;
             stream.push(&mut self.model, &mut self.buffers, corners, batch)?;
             batch.parts.push(part);
@@ -205,10 +209,11 @@ impl GltfReader {
         Ok(())
     }
 
-    /// The number of the present node among the parts.
+    /// The number of the present node among the parts, for one more triangle of it.
     #[inline]
-    fn part_number(&mut self) -> Result<u32, IoError> {
+    fn next_part(&mut self) -> Result<u32, IoError> {
         let visit = self.visit.as_mut().expect("triangles come from a node");
+        visit.triangles += 1;
         if let Some(part) = visit.part {
             return Ok(part);
         }
