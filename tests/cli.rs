@@ -63,7 +63,7 @@ fn unreadable_inputs_end_with_65_and_leave_nothing_behind() {
     let cube = std::fs::read(model(CUBE)).expect("the cube is there");
     check_unreadable("short.stl", Some(&cube[..cube.len() - 7]), "byte");
     check_unreadable("broken.ply", Some(b"ply\nformat ascii 1.0\nelement vertex x\n"), "line");
-    check_unreadable("model.glb", Some(b"glTF\x02\x00\x00\x00"), "not read yet");
+    check_unreadable("model.glb", Some(b"glTF\x02\x00\x00\x00"), "the header of a GLB file");
     check_unreadable("model.3mf", Some(b"PK\x03\x04rest"), "not read yet");
     check_unreadable("lines.obj", Some(b"v 0 0 0\nv 1 0 0\nl 1 2\n"), "no triangle");
     check_unreadable("points.obj", Some(b"v 0 0 0\nv 1 0 0\n"), "no triangle");
@@ -184,9 +184,9 @@ fn an_output_folder_that_is_no_folder_ends_with_5() {
 }
 
 #[test]
-fn all_four_formats_are_written_and_read_again() {
+fn all_formats_are_written_and_read_again() {
     let folder = folder();
-    for ending in ["obj", "stl", "ply", "off"] {
+    for ending in ["obj", "stl", "ply", "off", "glb"] {
         let output = folder.path().join(format!("out.{ending}"));
         let (code, _, err) = repair(&model(CUBE), &output, &["--depth", "4"]);
         assert_eq!(code, 0, "{ending}: {err}");
@@ -194,7 +194,7 @@ fn all_four_formats_are_written_and_read_again() {
         let (code, _, err) = repair(&output, &again, &["--depth", "4"]);
         assert_eq!(code, 0, "{ending} again: {err}");
     }
-    assert_eq!(names_in(folder.path()).len(), 8, "outputs and nothing else");
+    assert_eq!(names_in(folder.path()).len(), 10, "outputs and nothing else");
 }
 
 #[test]

@@ -18,7 +18,7 @@ use crate::support::run::{Workshop, at_depth};
 const LIBRARY: &str = "newmtl oak\nKd 0.5 0.3 0.1\nnewmtl wool\nKd 0.1 0.2 0.8\nd 1\n";
 
 /// Formats that hold materials.
-const EXTENSIONS: [&str; 3] = ["obj", "ply", "3mf"];
+const EXTENSIONS: [&str; 4] = ["obj", "ply", "3mf", "glb"];
 
 /// Triangles by the names of their materials.
 type Painted = BTreeMap<String, Vec<Corners>>;

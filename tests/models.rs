@@ -29,7 +29,7 @@ fn every_model_of_the_named_folder_is_repaired_or_refused_for_its_content() {
     files.sort();
     let mut repaired = 0;
     for file in files {
-        if matches!(detect(&file), Err(IoError::Unsupported { .. } | IoError::Unreadable { .. })) {
+        if matches!(detect(&file), Err(IoError::Unreadable { .. })) {
             continue;
         }
         match repair_at(&file, DEPTH, FillRule::Solid) {

@@ -33,7 +33,7 @@ const STAGE: u32 = 4;
 const VERIFY_IMPORTS: [&str; 6] = ["geom", "mesh", "io", "store", "defect", "monitor"];
 
 /// Words of third-party crates, and the only files (or folders, ending in /) that may have them.
-const HOMES: [(&str, &[&str]); 19] = [
+const HOMES: [(&str, &[&str]); 20] = [
     ("memmap2::", &["store/mapped.rs", "store/brick/"]),
     ("unsafe ", &["store/mapped.rs", "cli/signals.rs", "cli/allocator.rs"]),
     ("signal_hook::", &["cli/signals.rs", "cli/last_words.rs"]),
@@ -43,6 +43,7 @@ const HOMES: [(&str, &[&str]); 19] = [
     ("zstd::", &["io/packed/zstandard.rs", "io/packed/tests.rs", "io/threemf/tests.rs"]),
     ("zip::", &["io/threemf/"]),
     ("quick_xml::", &["io/threemf/xml.rs"]),
+    ("draco_core::", &["io/gltf/draco.rs", "io/gltf/draco_tests.rs"]),
     ("exr::", &["report/image_exr.rs", "report/preview/tests.rs"]),
     ("png::", &["report/image_png.rs", "report/preview/tests.rs"]),
     ("clap::", &["cli/"]),

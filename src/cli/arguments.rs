@@ -61,8 +61,8 @@ pub struct ResultArguments {
     /// the proof of another one's file fails, the file is kept and the run ends with 4.
     #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
     method: MethodName,
-    /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ
-    /// and PLY.
+    /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ,
+    /// PLY, 3MF and GLB.
     #[arg(long)]
     tag_patches: bool,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.

@@ -17,7 +17,7 @@ use crate::cli::signals::Stop;
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
 pub struct EstimateArguments {
-    /// The model: OBJ, STL, PLY or OFF, told by content.
+    /// The model: OBJ, STL, PLY, OFF, 3MF or glTF, told by content.
     input: PathBuf,
     /// Where the repaired model would go; its extension is its format. Nothing is written.
     #[arg(short, long, value_name = "FILE")]
@@ -42,6 +42,7 @@ enum FormatName {
     Off,
     #[value(name = "3mf")]
     ThreeMf,
+    Glb,
 }
 
 impl From<FormatName> for Format {
@@ -52,6 +53,7 @@ impl From<FormatName> for Format {
             FormatName::Ply => Self::Ply,
             FormatName::Off => Self::Off,
             FormatName::ThreeMf => Self::ThreeMf,
+            FormatName::Glb => Self::Glb,
         }
     }
 }

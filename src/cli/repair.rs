@@ -21,7 +21,7 @@ use crate::cli::signals::Stop;
 #[derive(Debug, Args)]
 #[command(after_help = EXIT_STATUS)]
 pub struct RepairArguments {
-    /// The model: OBJ, STL, PLY or OFF, told by content.
+    /// The model: OBJ, STL, PLY, OFF, 3MF or glTF, told by content.
     input: PathBuf,
     /// Where the repaired model goes; its extension is its format.
     #[arg(short, long, value_name = "FILE")]

@@ -4,6 +4,7 @@ use std::path::Path;
 
 use crate::io::Format;
 use crate::io::error::{IoError, Place, shown};
+use crate::io::gltf::MAGIC;
 use crate::io::input::Input;
 use crate::io::off::is_off_keyword;
 use crate::io::packed::{Packing, Unpacker, content_name};
@@ -72,16 +73,13 @@ fn judge(
     head: &[u8],
     size_bytes: Option<u64>,
 ) -> Result<Format, IoError> {
-    let unsupported = |format| Err(IoError::Unsupported { path: path.to_path_buf(), format });
-    if head.starts_with(b"glTF") {
-        return unsupported("GLB");
-    }
     // Whether the archive holds a model is told when it is opened.
     if head.starts_with(b"PK\x03\x04") {
         return Ok(Format::ThreeMf);
     }
     let refused = |found: String| {
-        Err(IoError::unreadable(path, Place::Byte(0), "an OBJ, STL, PLY, OFF or 3MF file", found))
+        let expected = "an OBJ, STL, PLY, OFF, 3MF or glTF file";
+        Err(IoError::unreadable(path, Place::Byte(0), expected, found))
     };
     if head.is_empty() {
         return refused("an empty file".to_owned());
@@ -91,9 +89,6 @@ fn judge(
     }
     if let Some(format) = by_content(head, size_bytes) {
         return Ok(format);
-    }
-    if extension(name).as_deref() == Some("glb") {
-        return unsupported("GLB");
     }
     match format_of_extension(name) {
         Some(Format::ThreeMf) => refused(shown(head)),
@@ -116,6 +111,8 @@ pub fn format_of_extension(path: &Path) -> Option<Format> {
         "ply" => Some(Format::Ply),
         "off" | "coff" | "noff" => Some(Format::Off),
         "3mf" => Some(Format::ThreeMf),
+        // Text with the extension `.gltf` is told by its content; it is not written.
+        "glb" => Some(Format::Glb),
         _ => None,
     }
 }
@@ -125,6 +122,9 @@ fn extension(path: &Path) -> Option<String> {
 }
 
 fn by_content(head: &[u8], size_bytes: Option<u64>) -> Option<Format> {
+    if head.starts_with(MAGIC) {
+        return Some(Format::Glb);
+    }
     let first_line = head.split(|&b| b == b'\n').next().unwrap_or_default();
     if first_line.trim_ascii_end() == b"ply" {
         return Some(Format::Ply);
@@ -140,6 +140,10 @@ fn by_content(head: &[u8], size_bytes: Option<u64>) -> Option<Format> {
         return None;
     }
     let head = head.strip_prefix(MARK).unwrap_or(head);
+    // No other format is JSON.
+    if head.trim_ascii_start().starts_with(b"{") {
+        return Some(Format::Glb);
+    }
     let keyword = first_word_outside_of_comments(head)?;
     if keyword.eq_ignore_ascii_case(b"solid") {
         Some(Format::Stl)
@@ -187,6 +191,8 @@ mod tests {
             (b"\xef\xbb\xbfv 1 2 3\n", Format::Obj),
             (b"\xef\xbb\xbfsolid a\n", Format::Stl),
             (b"PK\x03\x04", Format::ThreeMf),
+            (b"glTF\x02\0\0\0", Format::Glb),
+            (b"\xef\xbb\xbf \n{\"asset\":{}}", Format::Glb),
         ] {
             for name in ["a.obj", "a.stl", "a.ply", "a.off", "a"] {
                 assert_eq!(detected(name, content).expect("known"), format, "{name}");
@@ -201,16 +207,5 @@ mod tests {
         assert!(matches!(detected("a.txt", b"hello"), Err(IoError::Unreadable { .. })));
         assert!(matches!(detected("a.obj", b""), Err(IoError::Unreadable { .. })));
         assert!(matches!(detected("a.3mf", b"x"), Err(IoError::Unreadable { .. })));
-    }
-
-    #[test]
-    fn glb_is_recognised_and_refused() {
-        for (name, content, expected) in
-            [("a.obj", &b"glTF\x02\0\0\0"[..], "GLB"), ("a.glb", b"x", "GLB")]
-        {
-            let error = detected(name, content).expect_err("refused");
-            assert!(matches!(&error, IoError::Unsupported { format, .. } if *format == expected));
-            assert!(error.is_input());
-        }
     }
 }

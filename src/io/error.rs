@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use crate::store::StoreError;
 
-/// Where in a file: lines for text, bytes for everything else.
+/// Where in a file: lines for text, bytes or numbered things for everything else.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Place {
     /// Line number, from 1.
@@ -14,6 +14,13 @@ pub enum Place {
     Byte(u64),
     /// Byte offset in a packed file, from 0.
     PackedByte(u64),
+    /// One of the numbered things of the file, from 0.
+    Item {
+        /// What it is, such as an accessor.
+        kind: &'static str,
+        /// Its number.
+        number: u64,
+    },
 }
 
 impl fmt::Display for Place {
@@ -22,6 +29,7 @@ impl fmt::Display for Place {
             Self::Line(line) => write!(f, "line {line}"),
             Self::Byte(offset) => write!(f, "byte {offset}"),
             Self::PackedByte(offset) => write!(f, "byte {offset} of the packed file"),
+            Self::Item { kind, number } => write!(f, "{kind} {number}"),
         }
     }
 }
@@ -49,14 +57,6 @@ pub enum IoError {
         path: PathBuf,
         /// What it is.
         found: &'static str,
-    },
-    /// A format that is known by name only.
-    #[error("{path} is a {format} file, which is not read yet")]
-    Unsupported {
-        /// The input file.
-        path: PathBuf,
-        /// The format's name.
-        format: &'static str,
     },
     /// The input holds more of something than can be numbered or held.
     #[error("{path} has more than {limit} {what}")]
@@ -113,7 +113,6 @@ impl IoError {
         match self {
             Self::Unreadable { .. }
             | Self::NotAFile { .. }
-            | Self::Unsupported { .. }
             | Self::TooMany { .. }
             | Self::Bomb { .. }
             | Self::Input { .. } => true,

@@ -20,7 +20,7 @@ fn files_cut_at_any_byte_end_in_an_answer() {
 
 #[test]
 fn binary_files_that_end_too_early_are_refused_with_the_offset() {
-    for name in ["b.stl", "b.ply", "c.ply"] {
+    for name in ["b.stl", "b.ply", "c.ply", "a.glb"] {
         let (_, bytes) = samples().into_iter().find(|sample| sample.0 == name).expect("a sample");
         let length = bytes.len() - 1;
         match read_bytes(name, &bytes[..length]) {
@@ -50,7 +50,7 @@ fn text_files_that_end_too_early_are_refused_with_the_line() {
 proptest! {
     #[test]
     fn mutated_files_never_bring_a_reader_down(
-        sample in 0..7_usize,
+        sample in 0..8_usize,
         edits in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>(), 0..3_u8), 1..6),
     ) {
         let (name, mut bytes) = samples().swap_remove(sample);

@@ -138,17 +138,10 @@ impl Input {
         if self.end == self.buffer.len() {
             return Ok(false);
         }
-        let room = &mut self.buffer[self.end..];
-        let count = match &self.content {
-            Content::File(file) => read_at(file, room, self.end_offset)
-                .map_err(|e| IoError::input("read", &self.path, e))?,
-            Content::Unpacked { file, .. } => {
-                let left = self.size_bytes.saturating_sub(self.end_offset);
-                let count = left.min(room.len() as u64) as usize;
-                file.read_at(&mut room[..count], self.end_offset)?;
-                count
-            }
-        };
+        let mut buffer = std::mem::take(&mut self.buffer);
+        let count = self.read_some(&mut buffer[self.end..], self.end_offset);
+        self.buffer = buffer;
+        let count = count?;
         self.end += count;
         self.end_offset += count as u64;
         Ok(count > 0)
@@ -195,6 +188,35 @@ impl Input {
             self.at = (offset - buffer_offset) as usize;
         } else {
             (self.at, self.end, self.end_offset) = (0, 0, offset);
+        }
+    }
+
+    /// Reads all of `bytes` at a place of the content, past the buffer; not counted.
+    pub(crate) fn read_at(&self, bytes: &mut [u8], offset: u64) -> Result<(), IoError> {
+        let mut filled = 0;
+        while filled < bytes.len() {
+            let at = offset + filled as u64;
+            let count = self.read_some(&mut bytes[filled..], at)?;
+            if count == 0 {
+                return Err(self.ended("what was there before"));
+            }
+            filled += count;
+        }
+        Ok(())
+    }
+
+    /// Reads some bytes at a place of the content; none at its end.
+    fn read_some(&self, room: &mut [u8], offset: u64) -> Result<usize, IoError> {
+        match &self.content {
+            Content::File(file) => {
+                read_at(file, room, offset).map_err(|e| IoError::input("read", &self.path, e))
+            }
+            Content::Unpacked { file, .. } => {
+                let left = self.size_bytes.saturating_sub(offset);
+                let count = left.min(room.len() as u64) as usize;
+                file.read_at(&mut room[..count], offset)?;
+                Ok(count)
+            }
         }
     }
 

@@ -4,14 +4,18 @@
 //! triangles in file order, or a [`MeshSink`] that takes vertices and triangles.
 //!
 //! Invariant: what is read depends on the file alone, never on the memory granted. Positions are
-//! written exactly (OBJ, PLY, OFF and 3MF as `f64`, STL rounded to `f32`). Units: model units.
+//! written exactly (OBJ, PLY, OFF and 3MF as `f64`, STL and GLB rounded to `f32`). Units: model
+//! units.
 //!
-//! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB), the names of parts and materials, and
-//! the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`, and of 3MF a tag of up to
-//! 1 MiB. A writer holds 256 KiB.
+//! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB, 512 KiB for glTF), the names of parts and
+//! materials, and the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`, primitives
+//! that Draco has compressed are decoded whole, and of 3MF a tag of up to 1 MiB is held. A writer
+//! holds 256 KiB for each file; that of GLB 4 MiB more in the end.
 
+mod beside;
 mod detect;
 mod error;
+mod gltf;
 #[cfg(test)]
 mod hostile_tests;
 mod input;
@@ -36,10 +40,11 @@ use std::path::Path;
 use crate::io::detect::open_model;
 pub use crate::io::detect::{detect, format_of_extension};
 pub use crate::io::error::{IoError, Place};
+use crate::io::gltf::{GlbWriter, GltfReader};
 pub use crate::io::obj::{LIBRARY_MARK, library_name, write_library};
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
-pub use crate::io::output::{FACES, check_output};
+pub use crate::io::output::{ASIDE, check_output};
 pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
@@ -63,6 +68,8 @@ pub enum Format {
     Off,
     /// 3D Manufacturing Format, XML in a zip archive.
     ThreeMf,
+    /// glTF 2.0: GLB, also read as JSON with its buffers beside it.
+    Glb,
 }
 
 /// The number type that a written file holds coordinates in.
@@ -79,7 +86,7 @@ impl Format {
     #[must_use]
     pub fn coordinates(self) -> CoordinateType {
         match self {
-            Self::Stl => CoordinateType::F32,
+            Self::Stl | Self::Glb => CoordinateType::F32,
             Self::Obj | Self::Ply | Self::Off | Self::ThreeMf => CoordinateType::F64,
         }
     }
@@ -87,7 +94,7 @@ impl Format {
     /// Whether triangles have materials.
     #[must_use]
     pub fn has_materials(self) -> bool {
-        matches!(self, Self::Obj | Self::Ply | Self::ThreeMf)
+        matches!(self, Self::Obj | Self::Ply | Self::ThreeMf | Self::Glb)
     }
 
     /// Whether triangles name vertices by number.
@@ -135,13 +142,14 @@ pub fn open(path: &Path, scratch: &Scratch, options: &ReadOptions) -> Result<Sou
         Format::Ply => Box::new(PlyReader::open(input, scratch, options)?),
         Format::Off => Box::new(OffReader::open(input, scratch, options)?),
         Format::ThreeMf => Box::new(ThreeMfReader::open(input, scratch, options)?),
+        Format::Glb => Box::new(GltfReader::open(input, scratch, options)?),
     })
 }
 
 /// Creates a model file, or empties the one that is there.
 ///
 /// STL is written in binary, PLY in little-endian binary with doubles, OBJ and OFF as text, 3MF as
-/// text that is packed. Until [`MeshSink::finish`] the file is not valid.
+/// text that is packed, glTF as GLB. Until [`MeshSink::finish`] the file is not valid.
 ///
 /// # Errors
 /// The file or a scratch file cannot be created.
@@ -158,6 +166,7 @@ pub fn create(
         Format::Ply => Box::new(PlyWriter::create(path, scratch, options)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
         Format::ThreeMf => Box::new(ThreeMfWriter::create(path, scratch, palette)?),
+        Format::Glb => Box::new(GlbWriter::create(path, scratch, options)?),
     })
 }
 
@@ -179,5 +188,6 @@ pub fn reopen(
         Format::Ply => Box::new(PlyWriter::reopen(path, scratch, options, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
         Format::ThreeMf => Box::new(ThreeMfWriter::reopen(path, scratch, palette, state)?),
+        Format::Glb => Box::new(GlbWriter::reopen(path, scratch, options, state)?),
     })
 }

@@ -13,7 +13,11 @@ const BUFFER_BYTES: usize = 256 << 10;
 /// Bytes below may be replaced at the end (headers with counts).
 const HEAD_BYTES: u64 = 4096;
 /// Faces that wait until all vertices are written, in the scratch folder.
-pub const FACES: &str = "output.faces";
+pub(crate) const FACES: &str = "output.faces";
+/// Vertices that wait until it is known what stands in front of them.
+pub(crate) const VERTICES: &str = "output.vertices";
+/// All that may wait beside an output.
+pub const ASIDE: [&str; 2] = [FACES, VERTICES];
 
 /// A file that grows at its end.
 #[derive(Debug)]
@@ -145,17 +149,7 @@ impl Output {
 
     /// Appends everything that was laid aside; that file stays until it is removed.
     pub(crate) fn append(&mut self, mut aside: Aside) -> Result<(), IoError> {
-        aside.stream.flush()?;
-        let mut block = vec![0; BUFFER_BYTES];
-        let mut at = 0;
-        while at < aside.stream.written_bytes {
-            let left = aside.stream.written_bytes - at;
-            let part = &mut block[..left.min(BUFFER_BYTES as u64) as usize];
-            aside.stream.file.read_at(part, at)?;
-            self.write(part)?;
-            at += part.len() as u64;
-        }
-        Ok(())
+        aside.for_each_block(|block| self.write(block))
     }
 
     /// Replaces bytes of the head, which exist already.
@@ -188,12 +182,13 @@ pub(crate) struct Aside {
 }
 
 impl Aside {
-    pub(crate) fn create(scratch: &Scratch) -> Result<Self, IoError> {
-        Ok(Self { stream: Stream::new(scratch.create(FACES)?) })
+    /// Starts one of [`ASIDE`].
+    pub(crate) fn create(scratch: &Scratch, name: &str) -> Result<Self, IoError> {
+        Ok(Self { stream: Stream::new(scratch.create(name)?) })
     }
 
-    pub(crate) fn reopen(scratch: &Scratch, state: &SinkFile) -> Result<Self, IoError> {
-        let file = scratch.open(FACES)?;
+    pub(crate) fn reopen(scratch: &Scratch, name: &str, state: &SinkFile) -> Result<Self, IoError> {
+        let file = scratch.open(name)?;
         file.truncate(state.bytes)?;
         Ok(Self { stream: Stream::reopen(file, state)? })
     }
@@ -208,12 +203,7 @@ impl Aside {
         self.stream.bytes()
     }
 
-    /// How far the file goes, for [`Aside::reopen`].
-    pub(crate) fn state(&mut self) -> Result<SinkFile, IoError> {
-        Ok(self.stream.state()?)
-    }
-
-    /// Shows everything that was laid aside, block by block.
+    /// Shows all bytes in order, in blocks of 256 KiB but for the last.
     pub(crate) fn for_each_block(
         &mut self,
         mut visit: impl FnMut(&[u8]) -> Result<(), IoError>,
@@ -229,5 +219,10 @@ impl Aside {
             at += part.len() as u64;
         }
         Ok(())
+    }
+
+    /// How far the file goes, for [`Aside::reopen`].
+    pub(crate) fn state(&mut self) -> Result<SinkFile, IoError> {
+        Ok(self.stream.state()?)
     }
 }

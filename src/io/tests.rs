@@ -4,7 +4,10 @@ use std::path::Path;
 
 use proptest::prelude::*;
 
-use crate::io::{BATCH_TRIANGLES, Format, IoError, ReadOptions, WriteOptions, create, open};
+use crate::io::gltf::gltf_square;
+use crate::io::{
+    BATCH_TRIANGLES, CoordinateType, Format, IoError, ReadOptions, WriteOptions, create, open,
+};
 use crate::mesh::{Discarded, Material, MeshSource, Part, SinkTriangles, TriangleBatch};
 use crate::store::Scratch;
 
@@ -108,12 +111,13 @@ fn write(path: &Path, format: Format, positions: &[[f64; 3]], triangles: &[[u32;
     assert_eq!(stats.file.bytes, std::fs::metadata(path).expect("the file").len());
 }
 
-const FORMATS: [(Format, &str); 5] = [
+const FORMATS: [(Format, &str); 6] = [
     (Format::Obj, "a.obj"),
     (Format::Stl, "a.stl"),
     (Format::Ply, "a.ply"),
     (Format::Off, "a.off"),
     (Format::ThreeMf, "a.3mf"),
+    (Format::Glb, "a.glb"),
 ];
 
 fn finite() -> impl Strategy<Value = f64> {
@@ -133,7 +137,10 @@ proptest! {
             let path = folder.path().join(name);
             write(&path, format, &positions, &triangles);
             let content = read_path(&path, 1 << 20).expect("readable");
-            let written = |x: f64| if format == Format::Stl { f64::from(x as f32) } else { x };
+            let written = |x: f64| match format.coordinates() {
+                CoordinateType::F32 => f64::from(x as f32),
+                CoordinateType::F64 => x,
+            };
             let expected: Vec<_> = triangles
                 .iter()
                 .map(|t| t.map(|v| positions[v as usize].map(written)))
@@ -166,6 +173,7 @@ pub(crate) fn samples() -> Vec<(&'static str, Vec<u8>)> {
         ("a.ply", ascii_ply().into()),
         ("b.ply", binary_ply(false)),
         ("c.ply", binary_ply(true)),
+        ("a.glb", gltf_square()),
     ]
 }
 
@@ -211,7 +219,8 @@ fn binary_ply(big_endian: bool) -> Vec<u8> {
 
 #[test]
 fn all_samples_are_readable_and_say_what_they_say() {
-    let expected = [(3, 0, 0), (3, 0, 1), (1, 0, 0), (3, 0, 0), (4, 1, 1), (1, 1, 0), (1, 1, 0)];
+    let expected =
+        [(3, 0, 0), (3, 0, 1), (1, 0, 0), (3, 0, 0), (4, 1, 1), (1, 1, 0), (1, 1, 0), (2, 0, 0)];
     for ((name, bytes), expected) in samples().iter().zip(expected) {
         let content = read_bytes(name, bytes).expect("readable");
         let Discarded { wild_index_faces, short_faces } = content.discarded;

@@ -22,8 +22,11 @@ pub struct SinkState {
     pub triangles: u64,
     /// The output.
     pub output: SinkFile,
-    /// What waits beside it, in formats that need that.
+    /// The faces that wait beside it, in formats that need that.
     pub aside: SinkFile,
+    /// The vertices that wait beside it, likewise.
+    #[serde(default)]
+    pub vertices_aside: SinkFile,
 }
 
 /// What a sink wrote.

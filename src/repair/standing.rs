@@ -6,7 +6,7 @@ use serde::de::IgnoredAny;
 use crate::bridge;
 use crate::contour::LOOKS;
 use crate::hidden;
-use crate::io::FACES;
+use crate::io::ASIDE;
 use crate::mesh::SinkFile;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::sign;
@@ -15,7 +15,7 @@ use crate::store::Manifest;
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 15] = [
+pub const PASSING: [&str; 16] = [
     "facts.spool",
     bridge::PASSING[0],
     bridge::PASSING[1],
@@ -28,7 +28,8 @@ pub const PASSING: [&str; 15] = [
     sign::PASSING[0],
     sign::PASSING[1],
     sign::PASSING[2],
-    FACES,
+    ASIDE[0],
+    ASIDE[1],
     LOOKS[0],
     LOOKS[1],
 ];
@@ -77,5 +78,5 @@ pub fn is_listed(manifest: &Manifest, name: &str) -> bool {
     }
     // The sink's files are told of by its own state.
     let is_writing = manifest.progress.is_some() && next_step(manifest) == Some(Step::Write);
-    is_writing && (name == OUTPUT_PART || name == FACES)
+    is_writing && (name == OUTPUT_PART || ASIDE.contains(&name))
 }

@@ -13,7 +13,7 @@ use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-use crate::io::{FACES, IoError, check_output};
+use crate::io::{ASIDE, IoError, check_output};
 use crate::mesh::SinkFile;
 use crate::monitor::Monitor;
 use crate::repair::RepairError;
@@ -245,7 +245,7 @@ impl Workspace {
     pub fn go_back_for(&self, path: &Path) -> Result<Option<Step>, StoreError> {
         let name = match path.file_name().and_then(|name| name.to_str()) {
             _ if path == self.part => OUTPUT_PART,
-            Some(FACES) => OUTPUT_PART,
+            Some(name) if ASIDE.contains(&name) => OUTPUT_PART,
             Some(name) => name.strip_suffix(".directory").unwrap_or(name),
             None => return Ok(None),
         };

@@ -16,11 +16,12 @@ use tempfile::TempDir;
 pub type Target = fn(&[u8]);
 
 /// All targets by the names of their corpora.
-pub const TARGETS: [(&str, Target); 9] = [
+pub const TARGETS: [(&str, Target); 10] = [
     ("obj", read_obj),
     ("stl", read_stl),
     ("ply", read_ply),
     ("off", read_off),
+    ("gltf", read_gltf),
     ("any", read_any),
     ("materials", read_materials),
     ("bricks", decode_bricks),
@@ -79,6 +80,10 @@ pub fn read_ply(bytes: &[u8]) {
 
 pub fn read_off(bytes: &[u8]) {
     read_named("a.off", bytes);
+}
+
+pub fn read_gltf(bytes: &[u8]) {
+    read_named("a.gltf", bytes);
 }
 
 /// Whatever the content says; also packed files.

@@ -6,11 +6,10 @@
 //! properties. Each is read once. Memory: the share, spilled beyond.
 
 use std::collections::BTreeSet;
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt;
 use std::os::unix::fs::MetadataExt;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 
+use crate::io::beside::{file_inside, folder_of};
 use crate::io::error::IoError;
 use crate::io::input::Input;
 use crate::io::names::Materials;
@@ -39,13 +38,9 @@ pub(crate) struct Library {
 impl Library {
     /// Nothing yet; libraries are sought beside `model`.
     pub(crate) fn new(model: &Path, scratch: &Scratch, share_bytes: u64) -> Self {
-        let folder = match model.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder,
-            _ => Path::new("."),
-        };
         Self {
             model: model.to_path_buf(),
-            folder: folder.canonicalize().ok(),
+            folder: folder_of(model),
             names: 0,
             last: Vec::new(),
             loaded: BTreeSet::new(),
@@ -93,17 +88,7 @@ impl Library {
         if self.names > MOST_NAMES {
             return Err(IoError::too_many(&self.model, "names of material libraries", MOST_NAMES));
         }
-        let name: Vec<u8> = name.iter().map(|&b| if b == b'\\' { b'/' } else { b }).collect();
-        let relative = Path::new(OsStr::from_bytes(&name));
-        let stays_inside = relative
-            .components()
-            .all(|part| matches!(part, Component::Normal(_) | Component::CurDir));
-        let Some(folder) = self.folder.as_ref().filter(|_| stays_inside && !name.is_empty()) else {
-            return Ok(None);
-        };
-        // Links may lead elsewhere: where the file really is counts.
-        let Ok(path) = folder.join(relative).canonicalize() else { return Ok(None) };
-        Ok((path.starts_with(folder) && path.is_file()).then_some(path))
+        Ok(self.folder.as_ref().and_then(|folder| file_inside(folder, name)))
     }
 
     fn load_file(&mut self, path: &Path) -> Result<(), IoError> {

@@ -11,7 +11,7 @@ use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
 use crate::io::output::Output;
 use crate::io::output_names::OutputNames;
-use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, Surface};
+use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
 use crate::store::Scratch;
 
 /// Writes `v`, `usemtl` and `f` lines.
@@ -125,8 +125,9 @@ impl MeshSink for ObjWriter {
     }
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
-        let (output, aside) = (self.output.state()?, SinkFile::default());
-        Ok(SinkState { vertices: self.vertices, triangles: self.triangles, output, aside })
+        let output = self.output.state()?;
+        let Self { vertices, triangles, .. } = *self;
+        Ok(SinkState { vertices, triangles, output, ..SinkState::default() })
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {

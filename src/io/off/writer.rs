@@ -7,7 +7,7 @@ use std::path::Path;
 
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
-use crate::io::output::{Aside, Output};
+use crate::io::output::{Aside, FACES, Output};
 use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use crate::store::Scratch;
 
@@ -23,7 +23,7 @@ pub(crate) struct OffWriter {
 
 impl OffWriter {
     pub(crate) fn create(path: &Path, scratch: &Scratch) -> Result<Self, IoError> {
-        let faces = Aside::create(scratch)?;
+        let faces = Aside::create(scratch, FACES)?;
         let mut output = Output::create(path, scratch)?;
         output.write(&header(0, 0))?;
         Ok(Self { output, faces, text: Vec::new(), vertices: 0, triangles: 0 })
@@ -36,7 +36,7 @@ impl OffWriter {
         state: &SinkState,
     ) -> Result<Self, IoError> {
         let output = Output::reopen(path, scratch, &state.output)?;
-        let faces = Aside::reopen(scratch, &state.aside)?;
+        let faces = Aside::reopen(scratch, FACES, &state.aside)?;
         let SinkState { vertices, triangles, .. } = *state;
         Ok(Self { output, faces, text: Vec::new(), vertices, triangles })
     }
@@ -84,7 +84,8 @@ impl MeshSink for OffWriter {
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
         let (output, aside) = (self.output.state()?, self.faces.state()?);
-        Ok(SinkState { vertices: self.vertices, triangles: self.triangles, output, aside })
+        let Self { vertices, triangles, .. } = *self;
+        Ok(SinkState { vertices, triangles, output, aside, ..SinkState::default() })
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {

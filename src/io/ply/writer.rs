@@ -8,7 +8,7 @@
 use std::path::Path;
 
 use crate::io::error::IoError;
-use crate::io::output::{Aside, Output};
+use crate::io::output::{Aside, FACES, Output};
 use crate::io::output_names::OutputNames;
 use crate::io::{Palette, WriteOptions};
 use crate::mesh::{Material, MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
@@ -45,7 +45,7 @@ impl PlyWriter {
         scratch: &Scratch,
         options: &WriteOptions,
     ) -> Result<Self, IoError> {
-        let faces = Aside::create(scratch)?;
+        let faces = Aside::create(scratch, FACES)?;
         let mut output = Output::create(path, scratch)?;
         output.write(&head(0, 0, options.palette.is_some()))?;
         if let Some(palette) = &options.palette {
@@ -68,7 +68,7 @@ impl PlyWriter {
         state: &SinkState,
     ) -> Result<Self, IoError> {
         let output = Output::reopen(path, scratch, &state.output)?;
-        let faces = Aside::reopen(scratch, &state.aside)?;
+        let faces = Aside::reopen(scratch, FACES, &state.aside)?;
         let colours = colours_of(options, scratch)?;
         let SinkState { vertices, triangles, .. } = *state;
         Ok(Self { output, faces, colours, vertices, triangles })
@@ -141,7 +141,8 @@ impl MeshSink for PlyWriter {
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
         let (output, aside) = (self.output.state()?, self.faces.state()?);
-        Ok(SinkState { vertices: self.vertices, triangles: self.triangles, output, aside })
+        let Self { vertices, triangles, .. } = *self;
+        Ok(SinkState { vertices, triangles, output, aside, ..SinkState::default() })
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {

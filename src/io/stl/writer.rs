@@ -7,7 +7,7 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::output::Output;
 use crate::io::stl::binary::{FACET_BYTES, HEADER_BYTES};
-use crate::mesh::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles};
+use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use crate::store::Scratch;
 
 /// Must not begin with `solid`, or readers take the file for text.
@@ -64,8 +64,9 @@ impl MeshSink for StlWriter {
     }
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
-        let (output, aside) = (self.output.state()?, SinkFile::default());
-        Ok(SinkState { vertices: self.vertices, triangles: self.facets, output, aside })
+        let output = self.output.state()?;
+        let Self { vertices, facets: triangles, .. } = *self;
+        Ok(SinkState { vertices, triangles, output, ..SinkState::default() })
     }
 
     fn finish(mut self: Box<Self>) -> Result<SinkStats, IoError> {

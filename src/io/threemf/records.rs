@@ -88,12 +88,13 @@ pub(super) fn for_each_record(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::io::output::FACES;
     use crate::store::Scratch;
 
     #[test]
     fn records_come_back_across_blocks() {
         let folder = tempfile::tempdir().expect("a temporary folder");
-        let mut aside = Aside::create(&Scratch::new(folder.path())).expect("a file");
+        let mut aside = Aside::create(&Scratch::new(folder.path()), FACES).expect("a file");
         let record = |i: u32| match i % 3 {
             0 => Record::Vertex([f64::from(i), -0.5, 1e300]),
             1 => Record::Triangle([i, 1, u32::MAX], None),

@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
-use crate::io::output::{Aside, Output};
+use crate::io::output::{Aside, FACES, Output};
 use crate::io::palette::Palette;
 use crate::io::threemf::records::{Record, for_each_record};
 use crate::io::threemf::vocabulary::{CORE, MODEL_RELATIONSHIP, RELATIONSHIPS};
@@ -49,7 +49,7 @@ impl ThreeMfWriter {
         scratch: &Scratch,
         palette: Option<Palette>,
     ) -> Result<Self, IoError> {
-        let records = Aside::create(scratch)?;
+        let records = Aside::create(scratch, FACES)?;
         let output = Output::create(path, scratch)?;
         Ok(Self { output, records, palette, record: Vec::new(), vertices: 0, triangles: 0 })
     }
@@ -62,7 +62,7 @@ impl ThreeMfWriter {
         state: &SinkState,
     ) -> Result<Self, IoError> {
         let output = Output::reopen(path, scratch, &state.output)?;
-        let records = Aside::reopen(scratch, &state.aside)?;
+        let records = Aside::reopen(scratch, FACES, &state.aside)?;
         let SinkState { vertices, triangles, .. } = *state;
         Ok(Self { output, records, palette, record: Vec::new(), vertices, triangles })
     }
@@ -105,7 +105,8 @@ impl MeshSink for ThreeMfWriter {
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
         let (output, aside) = (self.output.state()?, self.records.state()?);
-        Ok(SinkState { vertices: self.vertices, triangles: self.triangles, output, aside })
+        let Self { vertices, triangles, .. } = *self;
+        Ok(SinkState { vertices, triangles, output, aside, ..SinkState::default() })
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {

@@ -241,6 +241,7 @@ impl DiskModel<'_> {
             Format::ThreeMf => {
                 (LINE_BYTES / 2.0 * vertices + face * triangles, 25.0 * vertices + 17.0 * triangles)
             }
+            Format::Glb => (12.0 * vertices + face * triangles, face * triangles),
         };
         FileSizes {
             hits: self.brick_file(hits),
@@ -362,6 +363,7 @@ fn face_bytes(format: Format, vertices: f64) -> f64 {
     let digits = vertices.max(1.0).log10().floor() + 1.0;
     match format {
         Format::Ply => 13.0,
+        Format::Glb => 12.0,
         Format::Stl => 50.0,
         Format::Obj | Format::Off => 3.0 * digits + FACE_LINE_BYTES,
         Format::ThreeMf => (3.0 * digits + 40.0) / 2.0,
