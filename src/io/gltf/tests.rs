@@ -1,4 +1,4 @@
-//! Small glTF files that between them use everything the reader knows; real ones on request.
+//! Small glTF files that between them use everything the reader knows.
 
 use std::path::Path;
 
@@ -356,28 +356,4 @@ fn the_share_of_memory_changes_nothing() {
     assert_eq!(small.batch.len(), count as usize);
     assert_eq!(small.part_names(), ["last"]);
     assert!(small == large);
-}
-
-/// Set `BRICKMEND_MODELS` to paths, one on a line.
-#[test]
-#[ignore = "tells of real models"]
-fn real_files_are_told_of() {
-    let list = std::env::var("BRICKMEND_MODELS").unwrap_or_default();
-    for path in list.lines() {
-        let start = std::time::Instant::now();
-        let told = match read_file(Path::new(path), 64 << 20) {
-            Ok(content) => format!(
-                "{} triangles, {} parts, {} materials, {} uvs, {} colours, {:?}, {:?} vertices",
-                content.batch.len(),
-                content.parts.len(),
-                content.materials.len(),
-                content.batch.uvs.len(),
-                content.batch.colours.len(),
-                content.discarded,
-                content.vertex_count,
-            ),
-            Err(error) => error.to_string(),
-        };
-        eprintln!("{path}: {told} ({} ms)", start.elapsed().as_millis());
-    }
 }
