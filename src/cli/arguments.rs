@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use brickmend::contour::Method;
 use brickmend::ingest::SheetRule;
+use brickmend::mesh::LengthUnit;
 use brickmend::repair::{Depth, HiddenRule, Length, Limits, MaxHole, Reach, Settings, ThinRule};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
@@ -61,6 +62,10 @@ pub struct ResultArguments {
     /// the proof of another one's file fails, the file is kept and the run ends with 4.
     #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
     method: MethodName,
+    /// What a model unit is, for files that do not say so: then lengths may be given in mm, cm, m or
+    /// in, and 3MF outputs say it. No number is changed.
+    #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
+    units: Option<LengthUnit>,
     /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ,
     /// PLY, 3MF and GLB.
     #[arg(long)]
@@ -192,6 +197,7 @@ impl ResultArguments {
             method,
             decimate,
             max_triangles,
+            unit: self.units,
             tag_patches: self.tag_patches,
             strict,
         }
@@ -238,6 +244,21 @@ fn parse_angle(text: &str) -> Result<f64, String> {
         Ok(degrees) if (0.0..=90.0).contains(&degrees) => Ok(degrees),
         _ => Err("expected an angle from 0 to 90 degrees".to_owned()),
     }
+}
+
+/// A unit by its name or its sign.
+fn parse_unit(text: &str) -> Result<LengthUnit, String> {
+    let name = match text {
+        "um" => "micron",
+        "mm" => "millimeter",
+        "cm" => "centimeter",
+        "in" => "inch",
+        "ft" => "foot",
+        "m" => "meter",
+        name => name,
+    };
+    let expected = "expected um, mm, cm, in, ft or m";
+    LengthUnit::of(name).ok_or_else(|| format!("{expected}, found {text:?}"))
 }
 
 /// Sizes with decimal (kB, MB, GB) or binary (KiB, MiB, GiB) units.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::error::IngestError;
 use crate::ingest::names::{PART_NAMES, write_materials, write_names};
 use crate::io::MATERIALS;
-use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
+use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
 use crate::store::{FileState, Resources, Spool, SpoolWriter, StoreError};
@@ -33,6 +33,8 @@ pub struct AttributeRecord {
 pub struct SoupFacts {
     /// Box of the finite triangles; empty when there is none.
     pub bounds: SnapBox,
+    /// What a model unit is, where the file says so.
+    pub unit: Option<LengthUnit>,
     /// Parts that have triangles.
     pub parts: u64,
     /// Materials that have triangles.
@@ -161,6 +163,7 @@ pub fn read_soup<S: MeshSource + ?Sized>(
         attributes: writer.attributes.map(SpoolWriter::finish).transpose()?,
         facts: SoupFacts {
             bounds: writer.bounds,
+            unit: source.unit(),
             parts,
             materials,
             has_materials,

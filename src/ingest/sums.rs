@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::error::IngestError;
 use crate::ingest::rims::{RimSketch, Rims};
 use crate::ingest::soup::{SoupStats, has_materials};
-use crate::mesh::{MeshSource, TriangleBatch};
+use crate::mesh::{LengthUnit, MeshSource, TriangleBatch};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::SnapBox;
 use crate::store::StoreError;
@@ -36,6 +36,8 @@ pub struct SoupSums {
     pub projected_area: f64,
     /// Sum of their extents along the three axes, model units.
     pub extent: f64,
+    /// What a model unit is, where the file says so.
+    pub unit: Option<LengthUnit>,
     /// Edges that an odd number of triangles shares.
     pub rims: Rims,
     /// Whether there are texture coordinates or colours.
@@ -81,6 +83,7 @@ pub fn sum_up<S: MeshSource + ?Sized>(
     }
     monitor.count(Counter::InputBytesRead, source.bytes_read() - read_bytes);
     adder.sums.has_materials = has_materials(source)?;
+    adder.sums.unit = source.unit();
     let mut sums = adder.sums;
     sums.stats.discarded = source.discarded();
     sums.stats.input_bytes = source.bytes_read();
@@ -102,6 +105,7 @@ impl Adder {
             area: 0.0,
             projected_area: 0.0,
             extent: 0.0,
+            unit: None,
             rims: Rims::default(),
             has_attributes: false,
             has_materials: false,

@@ -49,7 +49,7 @@ pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
 use crate::io::threemf::{ThreeMfReader, ThreeMfWriter};
-use crate::mesh::{MeshSink, MeshSource, SinkState};
+use crate::mesh::{LengthUnit, MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
 /// The most triangles in one batch.
@@ -97,6 +97,12 @@ impl Format {
         matches!(self, Self::Obj | Self::Ply | Self::ThreeMf | Self::Glb)
     }
 
+    /// Whether a reader of this format learns from it that the numbers are in `unit`.
+    #[must_use]
+    pub fn holds_unit(self, unit: LengthUnit) -> bool {
+        self == Self::ThreeMf || self == Self::Glb && unit == LengthUnit::Meter
+    }
+
     /// Whether triangles name vertices by number.
     #[must_use]
     pub fn has_indices(self) -> bool {
@@ -118,6 +124,8 @@ pub struct WriteOptions {
     pub palette: Option<Palette>,
     /// Whether triangles that close what was open are told apart.
     pub tag_patches: bool,
+    /// What a model unit is, for formats that say so (3MF).
+    pub unit: Option<LengthUnit>,
     /// File name of the material library beside an OBJ file, see [`library_name`].
     pub library: String,
 }
@@ -159,13 +167,12 @@ pub fn create(
     scratch: &Scratch,
     options: &WriteOptions,
 ) -> Result<Sink, IoError> {
-    let palette = options.palette.clone();
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::create(path, scratch, options)?),
         Format::Stl => Box::new(StlWriter::create(path, scratch)?),
         Format::Ply => Box::new(PlyWriter::create(path, scratch, options)?),
         Format::Off => Box::new(OffWriter::create(path, scratch)?),
-        Format::ThreeMf => Box::new(ThreeMfWriter::create(path, scratch, palette)?),
+        Format::ThreeMf => Box::new(ThreeMfWriter::create(path, scratch, options)?),
         Format::Glb => Box::new(GlbWriter::create(path, scratch, options)?),
     })
 }
@@ -181,13 +188,12 @@ pub fn reopen(
     options: &WriteOptions,
     state: &SinkState,
 ) -> Result<Sink, IoError> {
-    let palette = options.palette.clone();
     Ok(match format {
         Format::Obj => Box::new(ObjWriter::reopen(path, scratch, options, state)?),
         Format::Stl => Box::new(StlWriter::reopen(path, scratch, state)?),
         Format::Ply => Box::new(PlyWriter::reopen(path, scratch, options, state)?),
         Format::Off => Box::new(OffWriter::reopen(path, scratch, state)?),
-        Format::ThreeMf => Box::new(ThreeMfWriter::reopen(path, scratch, palette, state)?),
+        Format::ThreeMf => Box::new(ThreeMfWriter::reopen(path, scratch, options, state)?),
         Format::Glb => Box::new(GlbWriter::reopen(path, scratch, options, state)?),
     })
 }

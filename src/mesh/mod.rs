@@ -8,8 +8,10 @@ mod batch;
 mod material;
 mod sink;
 mod source;
+mod unit;
 
 pub use batch::{NO_POLYGON, Part, TriangleBatch};
 pub use material::{Material, Surface};
 pub use sink::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles};
 pub use source::{Discarded, MeshSource};
+pub use unit::LengthUnit;

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::{Material, Part, TriangleBatch};
+use crate::mesh::{LengthUnit, Material, Part, TriangleBatch};
 
 /// Faces that a reader had to leave out because they lead nowhere. Defects, not errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -52,6 +52,11 @@ pub trait MeshSource {
     /// As for [`MeshSource::part`].
     fn material(&mut self, _number: u32) -> Result<Material, Self::Error> {
         Ok(Material::default())
+    }
+
+    /// What a model unit is, where the file says so; known once a batch was delivered.
+    fn unit(&self) -> Option<LengthUnit> {
+        None
     }
 
     /// What was left out so far.

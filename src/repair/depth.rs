@@ -5,37 +5,38 @@ use std::path::Path;
 use crate::io::{CoordinateType, Format};
 use crate::octree::{Domain, SnapBox};
 use crate::repair::RepairError;
-use crate::repair::length::Reach;
+use crate::repair::length::{Reach, Ruler};
 use crate::repair::settings::Depth;
 
 /// Walls up to this thickness have room beside every model.
 const FREE_CELLS: f64 = 2.0;
 
 /// The box with room for walls that are thicker than those of the default.
-fn roomy(bounds: &SnapBox, sheet_thickness: Reach) -> SnapBox {
+fn roomy(ruler: &Ruler, sheet_thickness: Reach) -> SnapBox {
+    let bounds = &ruler.bounds;
     let half = match sheet_thickness {
         Reach::Cells(cells) if cells <= FREE_CELLS => return *bounds,
         // Cells are no wider than the longest side over as many as fit in depth 4.
         Reach::Cells(cells) => (cells - FREE_CELLS) * 0.5 * bounds.longest() / 8.0,
-        Reach::Length(length) => 0.5 * length.in_model_units(bounds).unwrap_or(0.0),
+        Reach::Length(length) => 0.5 * length.in_model_units(ruler).unwrap_or(0.0),
     };
     bounds.grown(half)
 }
 
-/// The domain around `bounds`, with room for walls, at the depth that `depth` means for it and for
-/// the output's format.
+/// The domain around the box of `ruler`, with room for walls, at the depth that `depth` means for
+/// it and for the output's format.
 ///
 /// # Errors
-/// [`RepairError::NoUnit`] for metres, since `input` states no unit; or
+/// [`RepairError::NoUnit`] for metres where nobody states the unit of `input`; or
 /// [`RepairError::OutputTooCoarse`].
 pub fn choose_domain(
     input: &Path,
-    bounds: &SnapBox,
+    ruler: &Ruler,
     depth: Depth,
     sheet_thickness: Reach,
     format: Format,
 ) -> Result<Domain, RepairError> {
-    let (model, bounds) = (bounds, &roomy(bounds, sheet_thickness));
+    let bounds = &roomy(ruler, sheet_thickness);
     let single = format.coordinates() == CoordinateType::F32;
     let around = |depth| {
         Domain::around(bounds, depth, single)
@@ -47,7 +48,7 @@ pub fn choose_domain(
         Depth::Tolerance { length, max_depth } => (length, max_depth),
     };
     let tolerance = length
-        .in_model_units(model)
+        .in_model_units(ruler)
         .ok_or_else(|| RepairError::NoUnit { path: input.to_path_buf() })?;
     let mut domain = around(*Depth::RANGE.start())?;
     for depth in *Depth::RANGE.start() + 1..=max_depth {

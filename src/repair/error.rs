@@ -107,7 +107,10 @@ pub enum RepairError {
         fewest: u64,
     },
     /// A length with a unit for a file without one.
-    #[error("{path} states no unit, so a length in metres means nothing; give model units or %")]
+    #[error(
+        "{path} states no unit, so a length in metres means nothing; say --units, or give model units \
+         or %"
+    )]
     NoUnit {
         /// The input.
         path: PathBuf,

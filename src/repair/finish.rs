@@ -194,7 +194,7 @@ fn reasons(
         ));
     }
     if let Depth::Tolerance { length, max_depth } = run.settings.depth {
-        let wanted = length.in_model_units(&findings.soup().bounds).unwrap_or(f64::INFINITY);
+        let wanted = length.in_model_units(&run.ruler(findings)).unwrap_or(f64::INFINITY);
         if domain.depth == max_depth && domain.cell_size() > 2.0 * wanted {
             reasons.push(format!(
                 "The tolerance {length} asks for more than depth {max_depth}: cells are {}",

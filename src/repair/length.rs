@@ -5,7 +5,17 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::LengthUnit;
 use crate::octree::{Domain, SnapBox};
+
+/// What lengths of a model are measured by.
+#[derive(Clone, Copy, Debug)]
+pub struct Ruler {
+    /// Box of the model.
+    pub bounds: SnapBox,
+    /// What a model unit is, where the file or the user says so.
+    pub unit: Option<LengthUnit>,
+}
 
 /// A length with its unit.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -15,7 +25,7 @@ pub enum Length {
     Model(f64),
     /// A share of the bounding box diagonal, in percent.
     Percent(f64),
-    /// Metres; only for files that state a unit.
+    /// Metres; only where the file or the user says what a model unit is.
     Metres(f64),
 }
 
@@ -65,13 +75,13 @@ impl Display for Length {
 }
 
 impl Length {
-    /// The length in model units; `None` for metres, since no file format read so far has a unit.
+    /// The length in model units; `None` for metres where nobody says what those are.
     #[must_use]
-    pub fn in_model_units(self, bounds: &SnapBox) -> Option<f64> {
+    pub fn in_model_units(self, ruler: &Ruler) -> Option<f64> {
         match self {
             Self::Model(value) => Some(value),
-            Self::Percent(value) => Some(bounds.diagonal() * value / 100.0),
-            Self::Metres(_) => None,
+            Self::Percent(value) => Some(ruler.bounds.diagonal() * value / 100.0),
+            Self::Metres(value) => ruler.unit.map(|unit| value / unit.metres()),
         }
     }
 }
@@ -90,12 +100,12 @@ impl Reach {
     /// How far vertices may lie from the planes they stand for, unless the user says otherwise.
     pub const DEFAULT_DECIMATE: Self = Self::Cells(0.1);
 
-    /// In cells; `None` for metres, since no file format read so far has a unit.
+    /// In cells; `None` for metres where nobody says what model units are.
     #[must_use]
-    pub fn in_cells(self, bounds: &SnapBox, domain: &Domain) -> Option<f64> {
+    pub fn in_cells(self, ruler: &Ruler, domain: &Domain) -> Option<f64> {
         match self {
             Self::Cells(cells) => Some(cells),
-            Self::Length(length) => Some(length.in_model_units(bounds)? / domain.cell_size()),
+            Self::Length(length) => Some(length.in_model_units(ruler)? / domain.cell_size()),
         }
     }
 }

@@ -34,9 +34,9 @@ impl Run<'_> {
     }
 
     pub(crate) fn mend_options(&self, findings: &Findings) -> Result<MendOptions, RepairError> {
-        let (bounds, domain) = (&findings.soup().bounds, findings.domain());
+        let (ruler, domain) = (self.ruler(findings), findings.domain());
         let in_model_units = |length: Reach| {
-            let cells = length.in_cells(bounds, domain);
+            let cells = length.in_cells(&ruler, domain);
             let no_unit = || RepairError::NoUnit { path: self.input.to_path_buf() };
             cells.map(|cells| cells * domain.cell_size()).ok_or_else(no_unit)
         };
@@ -50,7 +50,7 @@ impl Run<'_> {
             max_gap: in_model_units(settings.max_gap)?,
             thickness: in_model_units(settings.sheet_thickness)?,
             crease_deg: settings.crease_deg,
-            bounds: *bounds,
+            bounds: ruler.bounds,
         })
     }
 }

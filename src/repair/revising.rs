@@ -209,9 +209,9 @@ impl Run<'_> {
             return Ok(false);
         }
         let depth = Depth::Levels(findings.domain().depth + 1);
-        let (bounds, thickness) = (&findings.soup().bounds, settings.sheet_thickness);
+        let (ruler, thickness) = (self.ruler(findings), settings.sheet_thickness);
         // An output that cannot hold a deeper grid is no reason to end the run.
-        match choose_domain(self.input, bounds, depth, thickness, self.format) {
+        match choose_domain(self.input, &ruler, depth, thickness, self.format) {
             Ok(domain) => findings.deeper = Some(domain),
             Err(RepairError::OutputTooCoarse { .. }) => return Ok(false),
             Err(error) => return Err(error),

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::contour::Method;
 use crate::ingest::SheetRule;
+use crate::mesh::LengthUnit;
 use crate::repair::RepairError;
 use crate::repair::length::{Length, LengthError, Reach};
 use crate::sign::FillRule;
@@ -120,6 +121,8 @@ pub struct Settings {
     pub decimate: Reach,
     /// The threshold above is raised until the surface has at most so many triangles.
     pub max_triangles: Option<u64>,
+    /// What a model unit is, for files that do not say so.
+    pub unit: Option<LengthUnit>,
     /// Whether what closes openings is told apart in the output, where its format can.
     pub tag_patches: bool,
     /// Refuse broken faces in place of dropping them.
@@ -141,6 +144,7 @@ impl Default for Settings {
             method: Method::Mdc,
             decimate: Reach::DEFAULT_DECIMATE,
             max_triangles: None,
+            unit: None,
             tag_patches: false,
             strict: false,
         }

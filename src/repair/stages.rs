@@ -22,6 +22,7 @@ use crate::repair::choose::{Trials, most_trials};
 use crate::repair::deeper::DepthTrial;
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
+use crate::repair::length::Ruler;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
 use crate::repair::step::{OUTPUT_PART, Step};
@@ -193,10 +194,10 @@ impl Run<'_> {
         if soup.spool.is_empty() {
             return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
-        let (settings, bounds) = (&self.settings, &soup.facts.bounds);
+        let (settings, ruler) = (&self.settings, self.ruler(findings));
         let thickness = settings.sheet_thickness;
-        let domain = choose_domain(self.input, bounds, settings.depth, thickness, self.format)?;
-        if self.levels().iter().any(|level| level.decimate.in_cells(bounds, &domain).is_none()) {
+        let domain = choose_domain(self.input, &ruler, settings.depth, thickness, self.format)?;
+        if self.levels().iter().any(|level| level.decimate.in_cells(&ruler, &domain).is_none()) {
             return Err(RepairError::NoUnit { path: self.input.to_path_buf() });
         }
         findings.domain = Some(domain);
@@ -275,9 +276,15 @@ impl Run<'_> {
         RepairError::EmptyResult { path: self.input.to_path_buf(), reason }
     }
 
+    /// What lengths are measured by.
+    pub(crate) fn ruler(&self, findings: &Findings) -> Ruler {
+        let soup = findings.soup();
+        Ruler { bounds: soup.bounds, unit: soup.unit.or(self.settings.unit) }
+    }
+
     pub(crate) fn contour_options(&self, findings: &Findings) -> ContourOptions {
-        let bounds = &findings.soup().bounds;
-        let asked_cells = self.level(findings).decimate.in_cells(bounds, findings.domain());
+        let ruler = self.ruler(findings);
+        let asked_cells = self.level(findings).decimate.in_cells(&ruler, findings.domain());
         let decimate_cells = findings.raised_cells.or(asked_cells);
         ContourOptions {
             method: self.settings.method,

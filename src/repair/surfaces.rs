@@ -36,6 +36,10 @@ impl Run<'_> {
             (soup.has_uvs, "texture coordinates"),
             (soup.has_colours, "colours of vertices"),
             (soup.parts > 1, "names of parts"),
+            (
+                self.ruler(findings).unit.is_some_and(|unit| !self.format.holds_unit(unit)),
+                "the unit",
+            ),
         ];
         let lost = lost.iter().filter(|(is_lost, _)| *is_lost);
         TransferReport {
@@ -60,7 +64,8 @@ impl Run<'_> {
             }
         };
         let library = library_name(&workspace.output_path());
-        Ok(WriteOptions { palette, tag_patches: self.settings.tag_patches, library })
+        let unit = self.ruler(findings).unit;
+        Ok(WriteOptions { palette, tag_patches: self.settings.tag_patches, unit, library })
     }
 
     /// Puts the material library of an OBJ file in its place, before the file.

@@ -26,8 +26,9 @@ pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
         (blends, BLENDS),
         (pbr.base_color_factor.is_some(), HAS_BASE),
         (material.emissive_factor.is_some(), HAS_EMISSIVE),
-        (pbr.metallic_factor.is_some(), HAS_METALLIC),
-        (pbr.roughness_factor.is_some(), HAS_ROUGHNESS),
+        // What is not stated is one, which other formats do not know.
+        (true, HAS_METALLIC),
+        (true, HAS_ROUGHNESS),
     ];
     let emissive = material.emissive_factor.unwrap_or_default();
     MaterialRecord {
@@ -35,8 +36,8 @@ pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
         flags: flags.iter().map(|&(has, flag)| if has { flag } else { 0 }).sum(),
         base: pbr.base_color_factor.unwrap_or([1.0; 4]),
         emissive: emissive.map(|channel| channel * strength.unwrap_or(1.0)),
-        metallic: pbr.metallic_factor.unwrap_or_default(),
-        roughness: pbr.roughness_factor.unwrap_or_default(),
+        metallic: pbr.metallic_factor.unwrap_or(1.0),
+        roughness: pbr.roughness_factor.unwrap_or(1.0),
         texture: pbr.base_color_texture.as_ref().map_or(NONE, |texture| texture.index),
         ..MaterialRecord::zeroed()
     }

@@ -19,7 +19,7 @@ use crate::io::gltf::transform::Affine;
 use crate::io::input::Input;
 use crate::io::polygon::polygon_number;
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, Part, TriangleBatch};
 use crate::store::{Scratch, Table};
 
 /// The node whose mesh is being delivered.
@@ -247,6 +247,10 @@ impl GltfReader {
 
 impl MeshSource for GltfReader {
     type Error = IoError;
+
+    fn unit(&self) -> Option<LengthUnit> {
+        Some(LengthUnit::Meter)
+    }
 
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
         batch.clear();

@@ -119,15 +119,21 @@ impl Library {
         let Ok((materials, _)) = tobj::load_mtl_buf(&mut text.as_bytes()) else { return Ok(()) };
         for material in materials {
             let stated = |name: &str| material.unknown_param.get(name).map(String::as_str);
-            let number = |name| stated(name).and_then(|text| text.parse::<f32>().ok());
-            let dissolve = material.dissolve.map(|dissolve| dissolve as f32);
+            let number = |name| {
+                let number = stated(name).and_then(|text| text.parse::<f32>().ok());
+                number.filter(|number| number.is_finite())
+            };
+            let dissolve = material.dissolve.map(|d| d as f32).filter(|d| d.is_finite());
             let opacity = dissolve.or(number("Tr").map(|tr| 1.0 - tr));
             let material = Material {
                 transparent: opacity.is_some_and(|opacity| opacity < 1.0)
                     || number("Tr").is_some_and(|tr| tr > 0.0),
-                diffuse: material.diffuse.map(|colour| colour.map(|channel| channel as f32)),
+                diffuse: material
+                    .diffuse
+                    .map(|c| c.map(|channel| channel as f32))
+                    .filter(is_finite),
                 opacity: opacity.map(|opacity| opacity.clamp(0.0, 1.0)),
-                emissive: stated("Ke").and_then(colour),
+                emissive: stated("Ke").and_then(colour).filter(is_finite),
                 metallic: number("Pm"),
                 roughness: number("Pr"),
                 texture: material.diffuse_texture,
@@ -195,6 +201,10 @@ fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
             return Ok(Some((keyword, format!("{word} {}\n", numbers.join(" ")))));
         }
     }
+}
+
+fn is_finite(colour: &[f32; 3]) -> bool {
+    colour.iter().all(|channel| channel.is_finite())
 }
 
 /// Three numbers in words.

@@ -11,8 +11,9 @@ use crate::io::threemf::groups::GroupParser;
 use crate::io::threemf::part_name::part_key;
 use crate::io::threemf::scene::{Face, Kind, Object, Placed, Scene};
 use crate::io::threemf::transform::Transform;
-use crate::io::threemf::vocabulary::{Element, Space, Unit, is_understood};
+use crate::io::threemf::vocabulary::{Element, Space, UNIT_NAMES, is_understood};
 use crate::io::threemf::xml::{Markup, Tag, Where};
+use crate::mesh::LengthUnit;
 
 /// The longest namespace in a message.
 const LONGEST_SHOWN: usize = 100;
@@ -92,8 +93,8 @@ impl<'s> ModelParser<'s> {
         let unit = &mut self.scene.unit;
         tag.attributes(|space, name, value| match (space, name) {
             (Space::None, "unit") => {
-                let Some(stated) = Unit::of(value.trim()) else {
-                    return Err(tag.at.unreadable(Unit::NAMES, &shown(value.as_bytes())));
+                let Some(stated) = LengthUnit::of(value.trim()) else {
+                    return Err(tag.at.unreadable(UNIT_NAMES, &shown(value.as_bytes())));
                 };
                 if !is_root && stated != *unit {
                     let expected = format!("the unit of the root model, {unit:?}");

@@ -15,10 +15,10 @@ use crate::io::threemf::model::ModelParser;
 use crate::io::threemf::part_name::part_key;
 use crate::io::threemf::properties::NOTHING;
 use crate::io::threemf::scene::{Face, Scene};
-use crate::io::threemf::vocabulary::{MODEL_RELATIONSHIP, Space, Unit};
+use crate::io::threemf::vocabulary::{MODEL_RELATIONSHIP, Space};
 use crate::io::threemf::xml::{Markup, read_xml};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
-use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, Part, TriangleBatch};
 use crate::store::{Scratch, Table};
 
 /// Where a package says what it is.
@@ -77,12 +77,6 @@ impl ThreeMfReader {
             discarded: Discarded::default(),
             bytes_read: 0,
         })
-    }
-
-    /// What the numbers of the file are. Known once something was delivered.
-    #[cfg_attr(not(test), expect(dead_code, reason = "sizes are told in model units so far"))]
-    pub(super) fn unit(&self) -> Unit {
-        self.scene.unit
     }
 
     /// Parses all parts of the model and looks at every instance once.
@@ -172,6 +166,10 @@ impl ThreeMfReader {
 
 impl MeshSource for ThreeMfReader {
     type Error = IoError;
+
+    fn unit(&self) -> Option<LengthUnit> {
+        Some(self.scene.unit)
+    }
 
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
         batch.clear();

@@ -12,8 +12,8 @@ use bytemuck::{Pod, Zeroable};
 use crate::io::error::IoError;
 use crate::io::threemf::properties::{Group, NOTHING, Properties};
 use crate::io::threemf::transform::Transform;
-use crate::io::threemf::vocabulary::Unit;
 use crate::io::threemf::xml::Where;
+use crate::mesh::LengthUnit;
 use crate::store::{Dictionary, Scratch, StoreError, Table};
 
 /// What a resource turned out to be.
@@ -101,7 +101,7 @@ pub(super) struct Part {
 /// All that was read.
 pub(super) struct Scene {
     path: PathBuf,
-    pub(super) unit: Unit,
+    pub(super) unit: LengthUnit,
     pub(super) parts: Vec<Part>,
     part_numbers: BTreeMap<usize, u32>,
     /// Part and number in it of every resource.
@@ -120,7 +120,7 @@ impl Scene {
     pub(super) fn new(path: &Path, scratch: &Scratch, share_bytes: u64) -> Result<Self, IoError> {
         Ok(Self {
             path: path.to_path_buf(),
-            unit: Unit::default(),
+            unit: LengthUnit::default(),
             parts: Vec::new(),
             part_numbers: BTreeMap::new(),
             keys: Dictionary::new(scratch, share_bytes / 32),

@@ -9,8 +9,9 @@ use crate::io::input::Input;
 use crate::io::packed::HARMLESS_BYTES;
 use crate::io::tests::{Content, read_bytes};
 use crate::io::threemf::ThreeMfReader;
-use crate::io::threemf::vocabulary::{CORE, MODEL_RELATIONSHIP, RELATIONSHIPS, Unit};
+use crate::io::threemf::vocabulary::{CORE, MODEL_RELATIONSHIP, RELATIONSHIPS};
 use crate::io::{IoError, Place, ReadOptions};
+use crate::mesh::LengthUnit;
 use crate::mesh::{Material, MeshSource, TriangleBatch};
 use crate::store::Scratch;
 
@@ -199,9 +200,11 @@ fn the_unit_is_kept() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("a.3mf");
     let text = model(&object(1, ""), "<item objectid='1'/>");
-    for (name, unit) in
-        [("inch", Unit::Inch), ("micron", Unit::Micron), ("centimeter", Unit::Centimeter)]
-    {
+    for (name, unit) in [
+        ("inch", LengthUnit::Inch),
+        ("micron", LengthUnit::Micron),
+        ("centimeter", LengthUnit::Centimeter),
+    ] {
         let bytes = package(&text.replace("inch", name), &[]);
         std::fs::write(&path, &bytes).expect("a file");
         let input = Input::open(&path, 0).expect("opens");
@@ -210,7 +213,7 @@ fn the_unit_is_kept() {
         let mut reader = ThreeMfReader::open(input, &scratch, &options).expect("opens");
         let mut batch = TriangleBatch::default();
         assert!(reader.next_batch(&mut batch).expect("readable"));
-        assert_eq!(reader.unit(), unit);
+        assert_eq!(reader.unit(), Some(unit));
         assert!(reader.bytes_read() > 0);
         assert!(!reader.next_batch(&mut batch).expect("readable"));
         assert!(!reader.next_batch(&mut batch).expect("at its end"));

@@ -41,33 +41,8 @@ pub(super) fn is_understood(extension: &str) -> bool {
     [CORE, MATERIALS, PRODUCTION, TRIANGLE_SETS].contains(&extension)
 }
 
-/// What the numbers of a model are.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
-pub(super) enum Unit {
-    Micron,
-    #[default]
-    Millimeter,
-    Centimeter,
-    Inch,
-    Foot,
-    Meter,
-}
-
-impl Unit {
-    pub(super) const NAMES: &str = "micron, millimeter, centimeter, inch, foot or meter";
-
-    pub(super) fn of(name: &str) -> Option<Self> {
-        Some(match name {
-            "micron" => Self::Micron,
-            "millimeter" => Self::Millimeter,
-            "centimeter" => Self::Centimeter,
-            "inch" => Self::Inch,
-            "foot" => Self::Foot,
-            "meter" => Self::Meter,
-            _ => return None,
-        })
-    }
-}
+/// Units that a model may state.
+pub(super) const UNIT_NAMES: &str = "micron, millimeter, centimeter, inch, foot or meter";
 
 /// An element that means something to us, or not.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -6,6 +6,7 @@
 
 use std::path::Path;
 
+use crate::io::WriteOptions;
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
 use crate::io::output::{Aside, FACES, Output};
@@ -13,7 +14,7 @@ use crate::io::palette::Palette;
 use crate::io::threemf::records::{Record, for_each_record};
 use crate::io::threemf::vocabulary::{CORE, MODEL_RELATIONSHIP, RELATIONSHIPS};
 use crate::io::threemf::zip_file::ZipFile;
-use crate::mesh::{Material, MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
+use crate::mesh::{LengthUnit, Material, MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
 use crate::store::Scratch;
 
 /// The largest number of a vertex or a material that 3MF allows, and one.
@@ -38,6 +39,7 @@ pub(crate) struct ThreeMfWriter {
     output: Output,
     records: Aside,
     palette: Option<Palette>,
+    unit: LengthUnit,
     record: Vec<u8>,
     vertices: u64,
     triangles: u64,
@@ -47,24 +49,30 @@ impl ThreeMfWriter {
     pub(crate) fn create(
         path: &Path,
         scratch: &Scratch,
-        palette: Option<Palette>,
+        options: &WriteOptions,
     ) -> Result<Self, IoError> {
         let records = Aside::create(scratch, FACES)?;
         let output = Output::create(path, scratch)?;
-        Ok(Self { output, records, palette, record: Vec::new(), vertices: 0, triangles: 0 })
+        Ok(Self::new((output, records), options, &SinkState::default()))
     }
 
     /// Goes on where an earlier writer was.
     pub(crate) fn reopen(
         path: &Path,
         scratch: &Scratch,
-        palette: Option<Palette>,
+        options: &WriteOptions,
         state: &SinkState,
     ) -> Result<Self, IoError> {
         let output = Output::reopen(path, scratch, &state.output)?;
         let records = Aside::reopen(scratch, FACES, &state.aside)?;
+        Ok(Self::new((output, records), options, state))
+    }
+
+    fn new((output, records): (Output, Aside), options: &WriteOptions, state: &SinkState) -> Self {
         let SinkState { vertices, triangles, .. } = *state;
-        Ok(Self { output, records, palette, record: Vec::new(), vertices, triangles })
+        let palette = options.palette.clone();
+        let unit = options.unit.unwrap_or_default();
+        Self { output, records, palette, unit, record: Vec::new(), vertices, triangles }
     }
 
     fn push(&mut self, record: Record) -> Result<(), IoError> {
@@ -110,7 +118,7 @@ impl MeshSink for ThreeMfWriter {
     }
 
     fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
-        let Self { output, mut records, palette, vertices, triangles, .. } = *self;
+        let Self { output, mut records, palette, unit, vertices, triangles, .. } = *self;
         let too_many = too_large(&output, "materials");
         let mut zip = ZipFile::new(output);
         for (name, content) in
@@ -122,7 +130,8 @@ impl MeshSink for ThreeMfWriter {
         }
         let mesh_bytes = LONGEST_LINE_BYTES * (vertices + triangles);
         zip.start("3D/3dmodel.model", mesh_bytes + OTHER_BYTES > u64::from(u32::MAX))?;
-        zip.write(format!("{HEAD}<model unit=\"millimeter\" xmlns=\"{CORE}\">\n").as_bytes())?;
+        let unit = unit.name();
+        zip.write(format!("{HEAD}<model unit=\"{unit}\" xmlns=\"{CORE}\">\n").as_bytes())?;
         zip.write(b"<resources>\n")?;
         let materials = match &palette {
             Some(palette) => Materials::write(&mut zip, palette, &mut records, too_many)?,

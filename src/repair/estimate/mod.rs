@@ -26,6 +26,7 @@ use crate::repair::RepairError;
 use crate::repair::depth::choose_domain;
 use crate::repair::estimate::disk::DiskModel;
 use crate::repair::estimate::memory::MemoryModel;
+use crate::repair::length::Ruler;
 use crate::repair::plan::{MemoryPlan, floor_bytes};
 use crate::repair::settings::{Limits, Settings};
 use crate::store::Scratch;
@@ -121,8 +122,9 @@ pub fn estimate(
         return Err(RepairError::no_triangle(input, &sums.stats));
     }
     let thickness = settings.sheet_thickness;
-    let grid = choose_domain(input, &sums.bounds, settings.depth, thickness, format)?;
-    let sheet_cells = settings.sheet_thickness.in_cells(&sums.bounds, &grid);
+    let ruler = Ruler { bounds: sums.bounds, unit: sums.unit.or(settings.unit) };
+    let grid = choose_domain(input, &ruler, settings.depth, thickness, format)?;
+    let sheet_cells = settings.sheet_thickness.in_cells(&ruler, &grid);
     let no_unit = || RepairError::NoUnit { path: input.to_path_buf() };
     let counts = Counts::predict(&sums, &grid, sheet_cells.ok_or_else(no_unit)?);
     let reader_bytes = scratch.written_bytes();
