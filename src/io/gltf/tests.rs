@@ -263,7 +263,7 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         diffuse: Some([0.5, 0.25, 1.0]),
         opacity: Some(0.125),
         emissive: Some([2.0, 0.0, 0.0]),
-        metallic: None,
+        metallic: Some(1.0),
         roughness: Some(0.75),
         texture: Some("a%20b.png".to_owned()),
     };
@@ -271,6 +271,7 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         name: "glass".to_owned(),
         transparent: true,
         metallic: Some(0.5),
+        roughness: Some(1.0),
         ..Material::default()
     };
     assert_eq!(content.materials, [blend, Material::default(), glass]);

@@ -11,6 +11,9 @@ use crate::io::names::Materials;
 use crate::mesh::Material;
 use crate::store::{Dictionary, Scratch};
 
+/// How many materials are found without looking for their names.
+const RECENT: usize = 32;
+
 /// What a face says of its material.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(crate) struct FaceSurface {
@@ -24,8 +27,8 @@ pub(crate) struct FaceMaterials {
     /// Names by index, of which none is left out and no two are alike.
     declared: Dictionary,
     used: Materials,
-    /// The last material that was asked for, and its number.
-    last: Option<(u32, bool, u32)>,
+    /// Materials that were asked for of late, and their numbers.
+    recent: [Option<(u32, bool, u32)>; RECENT],
 }
 
 impl FaceMaterials {
@@ -33,7 +36,7 @@ impl FaceMaterials {
         Self {
             declared: Dictionary::new(scratch, share_bytes / 2),
             used: Materials::new(scratch, share_bytes / 2),
-            last: None,
+            recent: [None; RECENT],
         }
     }
 
@@ -55,7 +58,9 @@ impl FaceMaterials {
     /// The number of the material that a face uses.
     pub(crate) fn number(&mut self, path: &Path, face: FaceSurface) -> Result<u32, IoError> {
         let FaceSurface { index, is_patch, colour } = face;
-        if let Some((.., number)) = self.last.filter(|last| (last.0, last.1) == (index, is_patch)) {
+        let slot = (2 * index as usize + usize::from(is_patch)) % RECENT;
+        let known = self.recent[slot].filter(|known| (known.0, known.1) == (index, is_patch));
+        if let Some((.., number)) = known {
             return Ok(number);
         }
         let mut name = if u64::from(index) < self.declared.len() {
@@ -76,7 +81,7 @@ impl FaceMaterials {
             let material = Material { name, transparent, diffuse, opacity, ..Material::default() };
             self.used.set(number, &material)?;
         }
-        self.last = Some((index, is_patch, number));
+        self.recent[slot] = Some((index, is_patch, number));
         Ok(number)
     }
 

@@ -101,10 +101,19 @@ impl PlyReader {
     /// Reads triangles as far as they are plain and the batch has room for them.
     fn read_plain_triangles(&mut self, batch: &mut TriangleBatch) -> Result<(), IoError> {
         let Some(element) = self.header.elements.get(self.element) else { return Ok(()) };
-        if self.colours.is_none() && plain::has_plain_triangles(&self.body, element) {
-            let left = element.count - self.entry;
+        if self.colours.is_some() {
+            return Ok(());
+        }
+        if let Some(bytes) = plain::plain_triangle_bytes(&self.body, element) {
+            let range = (element.count - self.entry, self.polygons, bytes);
+            let path = self.body.input().path().to_path_buf();
+            let materials = &mut self.materials;
+            let material = |face| match materials {
+                Some(materials) => materials.number(&path, face),
+                None => Ok(0),
+            };
             let (body, positions) = (&mut self.body, &mut self.positions);
-            let read = plain::read_triangles(body, positions, left, self.polygons, batch)?;
+            let read = plain::read_triangles(body, positions, range, material, batch)?;
             self.entry += read;
             self.polygons += read;
         }
