@@ -64,7 +64,7 @@ fn unreadable_inputs_end_with_65_and_leave_nothing_behind() {
     check_unreadable("short.stl", Some(&cube[..cube.len() - 7]), "byte");
     check_unreadable("broken.ply", Some(b"ply\nformat ascii 1.0\nelement vertex x\n"), "line");
     check_unreadable("model.glb", Some(b"glTF\x02\x00\x00\x00"), "the header of a GLB file");
-    check_unreadable("model.3mf", Some(b"PK\x03\x04rest"), "not read yet");
+    check_unreadable("model.3mf", Some(b"PK\x03\x04rest"), "a zip archive");
     check_unreadable("lines.obj", Some(b"v 0 0 0\nv 1 0 0\nl 1 2\n"), "no triangle");
     check_unreadable("points.obj", Some(b"v 0 0 0\nv 1 0 0\n"), "no triangle");
 }
