@@ -10,8 +10,6 @@ use crate::store::{Dictionary, Scratch, StoreError};
 
 /// Memory for names; the least that a dictionary asks for.
 const SHARE_BYTES: u64 = 48 << 10;
-/// Ending of the names of what closes openings.
-const PATCH: &str = ".patch";
 
 /// The names of a palette, by material number.
 pub(crate) struct OutputNames {
@@ -36,7 +34,7 @@ impl OutputNames {
     pub(crate) fn name(&mut self, surface: Surface) -> Result<String, StoreError> {
         let name = self.names.name(surface.material())?;
         let name = String::from_utf8(name).expect("names are numbered as text");
-        Ok(if surface.is_patch() { name + PATCH } else { name })
+        Ok(if surface.is_patch() { name + Surface::PATCH_ENDING } else { name })
     }
 }
 

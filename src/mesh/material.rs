@@ -24,6 +24,19 @@ pub struct Material {
     pub texture: Option<String>,
 }
 
+/// Colour of a material that states none.
+const GREY: [f32; 3] = [0.8; 3];
+
+impl Material {
+    /// Colour and opacity as bytes, for formats that must have them.
+    #[must_use]
+    pub fn rgba(&self) -> [u8; 4] {
+        let [red, green, blue] = self.diffuse.unwrap_or(GREY);
+        let opacity = self.opacity.unwrap_or(if self.transparent { 0.5 } else { 1.0 });
+        [red, green, blue, opacity].map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8)
+    }
+}
+
 /// What a triangle of the output is: its material, and whether it closes what was open. Packed in
 /// four bytes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord, Hash)]
@@ -31,6 +44,8 @@ pub struct Surface(u32);
 
 impl Surface {
     const PATCH: u32 = 1 << 31;
+    /// What files add to the name of a material for its patches.
+    pub const PATCH_ENDING: &str = ".patch";
 
     /// A surface of this material; `is_patch` where it is not in the input.
     #[must_use]

@@ -1,6 +1,6 @@
 //! What the output tells of its triangles: materials, patches, and the library beside an OBJ file.
 
-use std::io::Read;
+use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use crate::contour::{Method, SurfaceDetail};
@@ -99,11 +99,13 @@ pub(super) fn keep_libraries<'o>(
 }
 
 fn keep_foreign(path: &Path) -> Result<(), RepairError> {
-    let Ok(file) = std::fs::File::open(path) else { return Ok(()) };
+    let foreign = || RepairError::ForeignLibrary { path: path.to_path_buf() };
+    let file = match std::fs::File::open(path) {
+        Ok(file) => file,
+        Err(error) if error.kind() == ErrorKind::NotFound => return Ok(()),
+        Err(_) => return Err(foreign()),
+    };
     let mut head = Vec::new();
     let read = file.take(LIBRARY_MARK.len() as u64).read_to_end(&mut head);
-    if read.is_ok() && head == LIBRARY_MARK.as_bytes() {
-        return Ok(());
-    }
-    Err(RepairError::ForeignLibrary { path: path.to_path_buf() })
+    if read.is_ok() && head == LIBRARY_MARK.as_bytes() { Ok(()) } else { Err(foreign()) }
 }

@@ -18,7 +18,7 @@ mod mixed;
 use serde::{Deserialize, Serialize};
 
 use crate::octree::{BinnedSoup, BorderBrick, BrickError, Domain, SoupBin, decode_hits, encode};
-use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
+use crate::store::{BrickFile, BrickPass, BrickWriter, Resources, StoreError, ordered_by_weight};
 use crate::transfer::edges::{EDGE_BYTES, Edges, MOST_EDGES};
 use crate::transfer::mixed::{MIXED_BYTES, MixedCells};
 
@@ -69,7 +69,7 @@ impl BorderStats {
 /// # Errors
 /// The file cannot be created.
 pub fn no_borders(resources: &Resources) -> Result<BrickFile, StoreError> {
-    let writer = crate::store::BrickWriter::create(resources.scratch, BORDERS, resources.backing)?;
+    let writer = BrickWriter::create(resources.scratch, BORDERS, resources.backing)?;
     writer.finish(resources.cached_windows)
 }
 

@@ -8,11 +8,9 @@ use serde::Serialize;
 use crate::io::error::IoError;
 use crate::io::output::Output;
 use crate::io::palette::Palette;
-use crate::mesh::Material;
+use crate::mesh::{Material, Surface};
 use crate::store::Table;
 
-/// What stands behind the name of a material in that of its patches.
-const PATCH: &str = ".patch";
 const STRENGTH: &str = "KHR_materials_emissive_strength";
 
 /// Triangles of each material: those of the input, and patches.
@@ -138,7 +136,9 @@ fn write_materials(
     let mut has_strength = false;
     let mut write = |number: u64, mut material: Material| {
         let used = if number < count { counts.get(number)? } else { [0; 2] };
-        for (suffix, _) in ["", PATCH].iter().zip(used).filter(|&(_, count)| count > 0) {
+        for (suffix, _) in
+            ["", Surface::PATCH_ENDING].iter().zip(used).filter(|&(_, count)| count > 0)
+        {
             material.name.push_str(suffix);
             let text = Stated::new(&material);
             has_strength |= text.extensions.is_some();

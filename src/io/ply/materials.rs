@@ -8,7 +8,7 @@ use std::path::Path;
 
 use crate::io::error::IoError;
 use crate::io::names::Materials;
-use crate::mesh::Material;
+use crate::mesh::{Material, Surface};
 use crate::store::{Dictionary, Scratch};
 
 /// How many materials are found without looking for their names.
@@ -69,7 +69,7 @@ impl FaceMaterials {
             format!("material_{index}")
         };
         if is_patch {
-            name.push_str(".patch");
+            name.push_str(Surface::PATCH_ENDING);
         }
         let before = self.used.count();
         let number = self.used.number(path, &name)?;

@@ -11,7 +11,7 @@ use crate::io::error::IoError;
 use crate::io::output::{Aside, FACES, Output};
 use crate::io::output_names::OutputNames;
 use crate::io::{Palette, WriteOptions};
-use crate::mesh::{Material, MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
+use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
 use crate::store::{Scratch, Table};
 
 /// Room for any two counts.
@@ -26,8 +26,6 @@ const SURFACE_BYTES: usize = 9;
 const BLOCK: usize = 128;
 /// Memory for colours.
 const COLOUR_SHARE_BYTES: u64 = 64 << 10;
-/// Colour of a material that states none.
-const GREY: [f32; 3] = [0.8; 3];
 
 /// Writes vertices at once and lays faces aside.
 pub(crate) struct PlyWriter {
@@ -160,17 +158,10 @@ fn colours_of(
 ) -> Result<Option<Table<[u8; 4]>>, IoError> {
     let read = |palette: &Palette| {
         let mut colours = Table::new(scratch, COLOUR_SHARE_BYTES);
-        palette.for_each(|_, material| Ok(colours.push(colour_of(&material))?))?;
+        palette.for_each(|_, material| Ok(colours.push(material.rgba())?))?;
         Ok(colours)
     };
     options.palette.as_ref().map(read).transpose()
-}
-
-/// Colour and opacity in bytes.
-fn colour_of(material: &Material) -> [u8; 4] {
-    let [r, g, b] = material.diffuse.unwrap_or(GREY);
-    let a = material.opacity.unwrap_or(if material.transparent { 0.5 } else { 1.0 });
-    [r, g, b, a].map(|channel| (channel.clamp(0.0, 1.0) * 255.0).round() as u8)
 }
 
 /// The header but for its last lines, filled up to a fixed size in a comment.

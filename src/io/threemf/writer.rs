@@ -23,8 +23,6 @@ const MOST_INDICES: u64 = 1 << 31;
 const LONGEST_LINE_BYTES: u64 = 128;
 /// What may stand in a model besides the mesh before its sizes would have to be large ones.
 const OTHER_BYTES: u64 = 1 << 30;
-/// The colour of materials that state none: there must be one.
-const GREY: [f32; 3] = [0.75; 3];
 
 const CONTENT_TYPES: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
     <Types xmlns=\"http://schemas.openxmlformats.org/package/2006/content-types\">\
@@ -186,7 +184,8 @@ impl Materials {
             if count == 0 {
                 zip.write(b"<basematerials id=\"1\">\n")?;
             }
-            for ending in ["", ".patch"].into_iter().take(1 + usize::from(has_patches)) {
+            for ending in ["", Surface::PATCH_ENDING].into_iter().take(1 + usize::from(has_patches))
+            {
                 text.clear();
                 push_base(&mut text, &material, ending);
                 zip.write(&text)?;
@@ -216,13 +215,9 @@ fn push_base(text: &mut Vec<u8>, material: &Material, ending: &str) {
     text.extend_from_slice(b"<base name=\"");
     push_escaped(text, &material.name);
     text.extend_from_slice(ending.as_bytes());
-    let byte = |channel: f32| (255.0 * channel.clamp(0.0, 1.0)).round() as u8;
-    let [r, g, b] = material.diffuse.unwrap_or(GREY).map(byte);
+    let [r, g, b, alpha] = material.rgba();
     // Readers take no alpha for an alpha of 0, and light passes or it does not.
-    let alpha = match (material.transparent, material.opacity) {
-        (true, opacity) => byte(opacity.unwrap_or(0.5)).clamp(1, 254),
-        (false, _) => 255,
-    };
+    let alpha = if material.transparent { alpha.clamp(1, 254) } else { 255 };
     let colour = format!("\" displaycolor=\"#{r:02X}{g:02X}{b:02X}{alpha:02X}\"/>\n");
     text.extend_from_slice(colour.as_bytes());
 }
