@@ -42,6 +42,11 @@ impl BorderPlanes {
         found
     }
 
+    /// Whether one material is alone.
+    pub(super) fn is_none(&self) -> bool {
+        self.count == 0
+    }
+
     /// The planes.
     pub(super) fn planes(&self) -> &[Hit] {
         &self.planes[..self.count]

@@ -7,6 +7,7 @@
 use glam::DVec3;
 
 use crate::contour::mdc::INSET_UNITS;
+use crate::contour::mdc::borders::BorderPlanes;
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::table::{axis_of_edge, corner_of_edge};
 use crate::contour::mdc::vertices::Workspace;
@@ -84,11 +85,6 @@ impl Workspace {
         brick: &mut CellBrick,
         stats: &mut ContourStats,
     ) -> Result<(), ContourError> {
-        if let Some(solution) = self.on_border(at, around) {
-            brick.positions.push(self.to_lattice(at, solution.position));
-            stats.clamped_vertices += u64::from(solution.clamped);
-            return Ok(());
-        }
         let attempt = match around.flat_normal() {
             Some(normal) => {
                 let normal = self.normals[normal as usize];
@@ -140,11 +136,19 @@ impl Workspace {
         Ok(())
     }
 
-    /// The vertex of a component in which materials meet.
-    fn on_border(&self, at: [usize; 3], around: &Around) -> Option<Solution> {
-        let border = self.border_planes(at, around);
+    /// The vertex of the only component of a cell, in which materials meet.
+    pub(super) fn place_on_border(
+        &self,
+        at: [usize; 3],
+        around: &Around,
+        border: &BorderPlanes,
+        brick: &mut CellBrick,
+        stats: &mut ContourStats,
+    ) {
         let hits = &around.hits(&self.normals)[..around.count];
-        (border.count > 0).then(|| solve_with(hits, border.planes(), &self.qef))
+        let solution = solve_with(hits, border.planes(), &self.qef);
+        brick.positions.push(self.to_lattice(at, solution.position));
+        stats.clamped_vertices += u64::from(solution.clamped);
     }
 
     pub(super) fn place_waiting(&mut self, brick: &mut CellBrick, stats: &mut ContourStats) {

@@ -4,6 +4,7 @@
 
 use glam::DVec3;
 
+use crate::contour::mdc::borders::BorderPlanes;
 use crate::contour::mdc::cluster::{CellPlane, JUDGES_ONLY, PlaneHit};
 use crate::contour::mdc::leaf_vertex::Around;
 use crate::contour::mdc::vertices::Workspace;
@@ -41,7 +42,13 @@ impl Workspace {
     }
 
     /// Adds a component of a cell to the leaves, before its vertex is placed.
-    pub(super) fn add_leaf(&mut self, at: [usize; 3], mask: u8, around: &Around) {
+    pub(super) fn add_leaf(
+        &mut self,
+        at: [usize; 3],
+        mask: u8,
+        around: &Around,
+        border: &BorderPlanes,
+    ) {
         let low = DVec3::from(at.map(|c| c as f64)) + 0.5;
         self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
         for i in 0..around.count {
@@ -57,7 +64,7 @@ impl Workspace {
             };
             self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
         }
-        for border in self.border_planes(at, around).planes() {
+        for border in border.planes() {
             let point = border.point + low;
             let offset = border.normal.dot(point);
             self.leaves.planes.push(CellPlane { normal: border.normal, offset });

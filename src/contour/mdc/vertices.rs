@@ -333,15 +333,21 @@ impl Workspace {
             self.place_in_middle(at, masks, brick);
         } else if components.count == 1 {
             let around = self.around(at, components.edge_masks[0]);
+            let border = self.border_planes(at, &around);
             if is_clustering {
-                self.add_leaf(at, mask, &around);
+                self.add_leaf(at, mask, &around, &border);
             }
-            self.place_alone(Place { signs, key }, at, &around, brick, stats)?;
+            if border.is_none() {
+                self.place_alone(Place { signs, key }, at, &around, brick, stats)?;
+            } else {
+                self.place_on_border(at, &around, &border, brick, stats);
+            }
         } else {
             if is_clustering {
                 for &edges in masks {
                     let around = self.around(at, edges);
-                    self.add_leaf(at, mask, &around);
+                    let border = self.border_planes(at, &around);
+                    self.add_leaf(at, mask, &around, &border);
                 }
             }
             self.place_apart(at, masks, brick, stats);
