@@ -115,15 +115,15 @@ pub fn thicken(
         resources.monitor.note("too many triangles to thicken those that are thin");
         return Ok(None);
     }
-    let mut losses = Losses::new(lost, first, resources)?;
-    if !may_be_torn(soup, &mut losses, domain, given, resources)? {
-        return Ok(None);
-    }
     let pairs = SoupEdges::find(soup, domain, Panes::Apart, resources)?.pairs;
     let mut sheets = Sheets::join(pairs, first, resources)?;
+    let mut losses = Losses::new(lost, first, resources)?;
     let mut added = Added::new(domain, first, resources);
     let mut stats = ThickenStats::default();
-    let is_judged = |triangle: &_, brick| is_judged(triangle, brick, domain, given);
+    // Walls and fills are as thick as they should be.
+    let is_judged = |triangle: &SoupTriangle, brick: u64| {
+        u64::from(triangle.source) < given && is_owned(triangle, domain, brick)
+    };
     let mut walk = soup.walk();
     while let Some(bin) = walk.next_bin()? {
         if resources.monitor.cancelled() {
@@ -164,39 +164,6 @@ pub fn thicken(
     add_all(soup, &mut added.bins)?;
     let (triangles, entries) = write_bins(added.bins, THICKENED, resources)?;
     Ok(Some((Thickened { triangles, entries }, stats)))
-}
-
-/// Whether a triangle is judged in this brick. Walls and fills are as thick as they should be.
-fn is_judged(triangle: &SoupTriangle, brick: u64, domain: &Domain, given: u64) -> bool {
-    u64::from(triangle.source) < given && is_owned(triangle, domain, brick)
-}
-
-/// Whether a brick has enough lost hits for a torn piece, however they are spread over sheets. Most
-/// models have none, and to join their sheets would cost more than the scan.
-fn may_be_torn(
-    soup: &BinnedSoup,
-    losses: &mut Losses,
-    domain: &Domain,
-    given: u64,
-    resources: &Resources,
-) -> Result<bool, StoreError> {
-    let mut walk = soup.walk();
-    while let Some(bin) = walk.next_bin()? {
-        if resources.monitor.cancelled() {
-            return Err(StoreError::Cancelled);
-        }
-        let mut lost = 0.0;
-        bin.each(soup, |triangle| {
-            if is_judged(triangle, bin.brick.0, domain, given) {
-                lost += losses.hits_of(triangle, domain)?.lost;
-            }
-            Ok(())
-        })?;
-        if lost >= LEAST_LOST {
-            return Ok(true);
-        }
-    }
-    Ok(false)
 }
 
 /// How many edges of the grid a triangle hits on average.
