@@ -24,7 +24,12 @@ fn write_stl(triangles: &[Corners], path: &Path, workshop: &Workshop) {
     let indices: Vec<[u32; 3]> =
         (0..triangles.len() as u32).map(|t| [3 * t, 3 * t + 1, 3 * t + 2]).collect();
     sink.vertices(&vertices).expect("the folder is writable");
-    let triangles = SinkTriangles { indices: &indices, corners: triangles, surfaces: &[] };
+    let triangles = SinkTriangles {
+        indices: &indices,
+        corners: triangles,
+        surfaces: &[],
+        ..SinkTriangles::default()
+    };
     sink.triangles(&triangles).expect("the folder is writable");
     sink.finish().expect("the folder is writable");
 }

@@ -201,6 +201,7 @@ where
             indices: &brick.indices,
             corners: &brick.corners,
             surfaces: &brick.surfaces,
+            ..SinkTriangles::default()
         };
         self.sink.triangles(&triangles).map_err(WriteError::Sink)?;
         self.stats.vertices += brick.fan_points.len() as u64;

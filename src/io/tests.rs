@@ -102,7 +102,12 @@ fn write(path: &Path, format: Format, positions: &[[f64; 3]], triangles: &[[u32;
     for (vertices, triangles) in [(early, &first[..]), (late, &triangles[first.len()..])] {
         sink.vertices(vertices).expect("writes");
         let corners: Vec<_> = triangles.iter().map(|t| t.map(|v| positions[v as usize])).collect();
-        let triangles = SinkTriangles { indices: triangles, corners: &corners, surfaces: &[] };
+        let triangles = SinkTriangles {
+            indices: triangles,
+            corners: &corners,
+            surfaces: &[],
+            ..SinkTriangles::default()
+        };
         sink.triangles(&triangles).expect("writes");
     }
     let stats = sink.finish().expect("finishes");

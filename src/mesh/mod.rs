@@ -12,6 +12,8 @@ mod unit;
 
 pub use batch::{NO_POLYGON, Part, TriangleBatch};
 pub use material::{Material, Surface};
-pub use sink::{MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles};
+pub use sink::{
+    CornerForm, CornerValues, MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, VertexValues,
+};
 pub use source::{Discarded, MeshSource};
 pub use unit::LengthUnit;

@@ -40,6 +40,48 @@ pub struct SinkStats {
     pub file: SinkFile,
 }
 
+/// How a sink takes what vertices have besides a position.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum CornerForm {
+    /// Not at all.
+    #[default]
+    None,
+    /// Texture coordinates and normals with every corner of a triangle; the sink may also keep the
+    /// lists in which corners name them by number (OBJ, PLY, 3MF). Colours with every vertex.
+    OfCorners,
+    /// One of each with every vertex: a vertex is handed over once for each that its corners have
+    /// (GLB).
+    OfVertices,
+}
+
+/// What vertices have besides a position, as slices parallel to them; each empty where there is
+/// none.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct VertexValues<'v> {
+    /// RGBA.
+    pub colours: &'v [[u8; 4]],
+    /// Texture coordinates, v up; only with [`CornerForm::OfVertices`].
+    pub uvs: &'v [[f32; 2]],
+    /// Unit normals; only with [`CornerForm::OfVertices`].
+    pub normals: &'v [[f32; 3]],
+}
+
+/// What the corners of triangles have of one kind, as slices parallel to these; both empty where
+/// they have none.
+#[derive(Clone, Copy, Debug)]
+pub struct CornerValues<'t, T> {
+    /// Numbers in the list that was handed over before.
+    pub numbers: &'t [[u32; 3]],
+    /// The same by value.
+    pub values: &'t [[T; 3]],
+}
+
+impl<T> Default for CornerValues<'_, T> {
+    fn default() -> Self {
+        Self { numbers: &[], values: &[] }
+    }
+}
+
 /// Triangles for a sink, as parallel slices.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SinkTriangles<'t> {
@@ -50,6 +92,10 @@ pub struct SinkTriangles<'t> {
     pub corners: &'t [[[f64; 3]; 3]],
     /// What they are; empty where the sink was not told of any material.
     pub surfaces: &'t [Surface],
+    /// Texture coordinates, v up; only with [`CornerForm::OfCorners`].
+    pub uvs: CornerValues<'t, [f32; 2]>,
+    /// Unit normals; only with [`CornerForm::OfCorners`].
+    pub normals: CornerValues<'t, [f32; 3]>,
 }
 
 /// Takes vertices and triangles in order and writes a file.
@@ -64,6 +110,36 @@ pub trait MeshSink {
     /// # Errors
     /// The file cannot be written.
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), Self::Error>;
+
+    /// How this sink takes colours, texture coordinates and normals.
+    fn corner_form(&self) -> CornerForm {
+        CornerForm::None
+    }
+
+    /// Tells what the vertices have that the last call of [`MeshSink::vertices`] appended.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    fn vertex_values(&mut self, _values: &VertexValues) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// Appends to the list of texture coordinates, v up; numbers from 0, ahead of the triangles
+    /// that name them.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    fn list_uvs(&mut self, _uvs: &[[f32; 2]]) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
+    /// Appends to the list of normals, likewise.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    fn list_normals(&mut self, _normals: &[[f32; 3]]) -> Result<(), Self::Error> {
+        Ok(())
+    }
 
     /// Whether [`MeshSink::triangles`] needs the corners' positions.
     fn needs_corners(&self) -> bool {

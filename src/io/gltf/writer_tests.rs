@@ -52,7 +52,7 @@ fn push(sink: &mut Sink, range: std::ops::Range<u32>, has_surfaces: bool) {
     let indices: Vec<_> = range.clone().map(|i| [i, i + 1, i + 2]).collect();
     let mut surfaces: Vec<_> = range.map(|i| surface(i as usize)).collect();
     surfaces.truncate(if has_surfaces { surfaces.len() } else { 0 });
-    let triangles = SinkTriangles { indices: &indices, corners: &[], surfaces: &surfaces };
+    let triangles = SinkTriangles { indices: &indices, surfaces: &surfaces, ..Default::default() };
     sink.triangles(&triangles).expect("writes");
 }
 

@@ -120,7 +120,12 @@ mod tests {
                 .expect("creates");
         writer.facets = u64::from(u32::MAX) - 1;
         let (indices, corners) = ([[0; 3]], [[[0.0; 3]; 3]]);
-        let facet = SinkTriangles { indices: &indices, corners: &corners, surfaces: &[] };
+        let facet = SinkTriangles {
+            indices: &indices,
+            corners: &corners,
+            surfaces: &[],
+            ..SinkTriangles::default()
+        };
         writer.triangles(&facet).expect("the last one fits");
         let refused = writer.triangles(&facet);
         assert!(matches!(refused, Err(IoError::TooLarge { .. })));

@@ -38,10 +38,12 @@ fn write_half(sink: &mut Sink, half: usize, surfaces: &[Surface]) {
     // All triangles come with the last vertices.
     if half == 1 {
         let first = surfaces.get(..2).unwrap_or_default();
-        let triangles = SinkTriangles { indices: &TRIANGLES[..2], corners: &[], surfaces: first };
+        let triangles =
+            SinkTriangles { indices: &TRIANGLES[..2], surfaces: first, ..Default::default() };
         sink.triangles(&triangles).expect("written");
         let surfaces = surfaces.get(range).unwrap_or_default();
-        sink.triangles(&SinkTriangles { indices, corners: &[], surfaces }).expect("written");
+        sink.triangles(&SinkTriangles { indices, surfaces, ..Default::default() })
+            .expect("written");
     }
 }
 
