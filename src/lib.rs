@@ -20,6 +20,7 @@
 //! invariants.
 
 pub mod bridge;
+pub mod catalogue;
 pub mod contour;
 pub mod defect;
 pub mod geom;

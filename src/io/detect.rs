@@ -117,6 +117,16 @@ pub fn format_of_extension(path: &Path) -> Option<Format> {
     }
 }
 
+/// The format that the whole name of a model says, also of a packed one (`chair.obj.gz`).
+#[must_use]
+pub fn format_of_name(path: &Path) -> Option<Format> {
+    let name = content_name(path);
+    match extension(&name)?.as_str() {
+        "gltf" => Some(Format::Glb),
+        _ => format_of_extension(&name),
+    }
+}
+
 fn extension(path: &Path) -> Option<String> {
     Some(path.extension()?.to_str()?.to_ascii_lowercase())
 }

@@ -38,7 +38,7 @@ mod words;
 use std::path::Path;
 
 use crate::io::detect::open_model;
-pub use crate::io::detect::{detect, format_of_extension};
+pub use crate::io::detect::{detect, format_of_extension, format_of_name};
 pub use crate::io::error::{IoError, Place};
 use crate::io::gltf::{GlbWriter, GltfReader};
 pub use crate::io::obj::{LIBRARY_MARK, library_name, write_library};
@@ -49,6 +49,7 @@ pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
 use crate::io::threemf::{ThreeMfReader, ThreeMfWriter};
+pub use crate::io::packed::content_name as unpacked_name;
 use crate::mesh::{LengthUnit, MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
@@ -56,7 +57,8 @@ use crate::store::Scratch;
 pub const BATCH_TRIANGLES: usize = 4096;
 
 /// A file format that is read and written.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Format {
     /// Wavefront OBJ with its MTL files.
     Obj,
@@ -82,6 +84,19 @@ pub enum CoordinateType {
 }
 
 impl Format {
+    /// The extension of files of this format.
+    #[must_use]
+    pub fn extension(self) -> &'static str {
+        match self {
+            Self::Obj => "obj",
+            Self::Stl => "stl",
+            Self::Ply => "ply",
+            Self::Off => "off",
+            Self::ThreeMf => "3mf",
+            Self::Glb => "glb",
+        }
+    }
+
     /// What the writer of this format holds coordinates in.
     #[must_use]
     pub fn coordinates(self) -> CoordinateType {

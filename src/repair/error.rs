@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use serde::{Deserialize, Serialize};
+
 use crate::contour::{ContourError, WriteError};
 use crate::ingest::{IngestError, SoupStats};
 use crate::io::IoError;
@@ -180,7 +182,8 @@ pub enum RepairError {
 }
 
 /// Whose fault an error is; decides the exit code and what becomes of the work folder.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Blame {
     /// Ours.
     Internal,

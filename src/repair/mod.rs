@@ -37,6 +37,7 @@ pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
+pub use lock::lock_folder;
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
 pub use settings::{Depth, HiddenRule, Limits, MaxHole, Settings, ThinRule};

@@ -1,5 +1,13 @@
 //! The hash by which a file of ours is known again: half of blake3.
 
+use std::fs::File;
+use std::io::{ErrorKind, Read};
+use std::path::Path;
+
+use crate::store::StoreError;
+
+/// What is read at a time.
+const BLOCK_BYTES: usize = 128 << 10;
 /// Size of a digest in bytes.
 pub const DIGEST_BYTES: usize = 16;
 
@@ -34,4 +42,26 @@ fn first_half(hash: &blake3::Hash) -> Digest {
     let mut half = [0; DIGEST_BYTES];
     half.copy_from_slice(&hash.as_bytes()[..DIGEST_BYTES]);
     half
+}
+
+/// The digest of the content of a file.
+///
+/// # Errors
+/// It cannot be read, or `cancelled` says to stop ([`StoreError::Cancelled`]).
+pub fn digest_file(path: &Path, cancelled: &dyn Fn() -> bool) -> Result<Digest, StoreError> {
+    let failed = |doing| move |error| StoreError::io(doing, path, error);
+    let mut file = File::open(path).map_err(failed("open"))?;
+    let mut digester = Digester::default();
+    let mut block = vec![0; BLOCK_BYTES];
+    loop {
+        if cancelled() {
+            return Err(StoreError::Cancelled);
+        }
+        match file.read(&mut block) {
+            Ok(0) => return Ok(digester.digest()),
+            Ok(count) => digester.update(&block[..count]),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error) => return Err(failed("read")(error)),
+        }
+    }
 }

@@ -70,6 +70,18 @@ impl StoreError {
         Self::Io { doing, path: path.to_path_buf(), source }
     }
 
+    /// Whether the disk, a quota or the system's limit of a file's size is reached.
+    #[must_use]
+    pub fn is_disk_full(&self) -> bool {
+        use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+        match self {
+            Self::Io { source, .. } => {
+                matches!(source.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+            }
+            _ => false,
+        }
+    }
+
     pub(crate) fn damaged(
         path: &Path,
         offset: u64,

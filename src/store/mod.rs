@@ -29,7 +29,7 @@ pub use brick_pass::BrickPass;
 pub use checkpoint::{Checkpoints, FileState, NoCheckpoints, Progress};
 pub use dictionary::{Dictionary, MOST_NAMES};
 pub(crate) use digest::digest;
-pub use digest::{DIGEST_BYTES, Digest, Digester};
+pub use digest::{DIGEST_BYTES, Digest, Digester, digest_file};
 pub use error::StoreError;
 pub use manifest::{Manifest, load_manifest, save_manifest};
 pub use outbox::Outbox;

@@ -57,7 +57,8 @@ impl Packing {
 }
 
 /// The name that the content of a packed file has: without the packing's extension.
-pub(crate) fn content_name(path: &Path) -> PathBuf {
+#[must_use]
+pub fn content_name(path: &Path) -> PathBuf {
     let extension = path.extension().unwrap_or_default().to_ascii_lowercase();
     if extension == "gz" || extension == "zst" {
         path.with_extension("")

@@ -1,0 +1,100 @@
+//! Models with which nothing is wrong: copied byte for byte, not repaired.
+
+use std::ffi::OsString;
+use std::fs::File;
+use std::os::unix::fs::MetadataExt;
+use std::path::Path;
+
+use crate::io::{Format, ReadOptions, format_of_name};
+use crate::monitor::Monitor;
+use crate::repair::{Blame, Limits, MemoryPlan, RepairError};
+use crate::store::{Scratch, StoreError, sync_folder};
+use crate::verify::{Outward, ProofOptions, VerifyError, prove};
+
+/// Copies `input` to `output`, whole or not at all, if it is sound and of the format that is asked
+/// for; whether it was.
+///
+/// Sound is what every output of a repair is: closed, 2-manifold, consistently oriented outward,
+/// without degenerate or intersecting triangles.
+///
+/// # Errors
+/// The disk fails, or the monitor asks to stop. What is wrong with the input is none: the repair
+/// tells it.
+pub fn copy_if_sound(
+    input: &Path,
+    output: &Path,
+    format: Format,
+    limits: &Limits,
+    monitor: &dyn Monitor,
+) -> Result<bool, RepairError> {
+    let is_packed = crate::io::unpacked_name(input) != input;
+    if is_packed || format_of_name(input) != Some(format) || format_of_name(output) != Some(format) {
+        return Ok(false);
+    }
+    if !is_sound(input, limits, monitor)? {
+        return Ok(false);
+    }
+    copy(input, output, limits)?;
+    Ok(true)
+}
+
+fn is_sound(input: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<bool, RepairError> {
+    let plan = MemoryPlan::within(limits)?;
+    let pool = rayon::ThreadPoolBuilder::new().num_threads(plan.threads).build();
+    let threads = plan.threads;
+    let pool = pool.map_err(|source| RepairError::Threads { threads, source })?;
+    let folder = limits.work_dir.as_deref().unwrap_or(Path::new("."));
+    let scratch = Scratch::new(folder);
+    let share_bytes = plan.share_bytes;
+    let options =
+        ProofOptions { share_bytes, outward: Outward::AlternatesWithNesting, intersections: true };
+    let mut open = || {
+        let source = crate::io::open(input, &scratch, &ReadOptions { share_bytes })?;
+        Ok(source as Box<dyn crate::mesh::MeshSource<Error = _> + Send>)
+    };
+    match prove(&mut open, &scratch, &options, &pool, monitor) {
+        Ok(proof) => Ok(proof.holds()),
+        Err(VerifyError::Store(error)) => Err(error.into()),
+        Err(VerifyError::Source { source }) => {
+            let error = RepairError::Input(source);
+            // What cannot be read is told by the repair, which has more to say of it.
+            if error.blame() == Blame::Input { Ok(false) } else { Err(error) }
+        }
+    }
+}
+
+/// Through a file in the work folder if that is on the same file system, else one beside the output.
+fn copy(input: &Path, output: &Path, limits: &Limits) -> Result<(), RepairError> {
+    let parent = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let device = |folder: &Path| std::fs::metadata(folder).map(|folder| folder.dev()).ok();
+    let work = limits.work_dir.as_deref().filter(|folder| device(folder) == device(parent));
+    let part = match work {
+        Some(folder) => folder.join("output.part"),
+        None => {
+            let mut hidden = OsString::from(".");
+            hidden.push(output.file_name().unwrap_or_default());
+            hidden.push(".brickmend.part");
+            parent.join(hidden)
+        }
+    };
+    let copied = copy_to(input, &part).and_then(|()| {
+        std::fs::rename(&part, output).map_err(|e| StoreError::io("put in place", output, e))
+    });
+    if copied.is_err() {
+        // What is left of it is of no use; that it cannot be removed changes nothing.
+        let _ = std::fs::remove_file(&part);
+    }
+    copied?;
+    Ok(sync_folder(parent)?)
+}
+
+fn copy_to(input: &Path, part: &Path) -> Result<(), StoreError> {
+    let failed = |doing, path: &Path| {
+        let path = path.to_path_buf();
+        move |error| StoreError::io(doing, &path, error)
+    };
+    let mut from = File::open(input).map_err(failed("open", input))?;
+    let mut to = File::create(part).map_err(failed("create", part))?;
+    std::io::copy(&mut from, &mut to).map_err(failed("copy to", part))?;
+    to.sync_all().map_err(failed("synchronise", part))
+}

@@ -1,0 +1,150 @@
+//! What the batch asks of a worker process, and what that answers: lines of JSON.
+//!
+//! The worker reads jobs from its input, one a line, and answers each with reports, one a line, of
+//! which the last is [`Report::Ended`]. Both ends are the same binary, so there is no version.
+
+use std::ffi::OsString;
+use std::os::unix::ffi::{OsStrExt, OsStringExt};
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::catalogue::stamp::Stamped;
+use crate::io::Format;
+use crate::monitor::Stage;
+use crate::repair::{Blame, Estimate, Outcome, Settings};
+
+/// A path with any bytes; JSON alone would lose those that are no text.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct RawPath(Vec<u8>);
+
+impl RawPath {
+    /// The bytes of a path.
+    #[must_use]
+    pub fn new(path: &Path) -> Self {
+        Self(path.as_os_str().as_bytes().to_vec())
+    }
+
+    /// The path.
+    #[must_use]
+    pub fn to_path(&self) -> PathBuf {
+        OsString::from_vec(self.0.clone()).into()
+    }
+}
+
+/// What is to be done with a model.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Task {
+    /// Tell what a repair would take.
+    Estimate,
+    /// Repair it.
+    Repair,
+    /// Copy it if nothing is wrong with it, else repair it.
+    RepairBroken,
+}
+
+/// A model for a worker.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Job {
+    /// What to do.
+    pub task: Task,
+    /// The model.
+    pub input: RawPath,
+    /// Where the result goes.
+    pub output: RawPath,
+    /// Its format.
+    pub format: Format,
+    /// Everything that changes the result.
+    pub settings: Settings,
+    /// Peak resident memory of the worker.
+    pub max_memory_bytes: u64,
+    /// Threads of the worker.
+    pub threads: usize,
+    /// Most that scratch files and the output may take.
+    pub max_disk_bytes: Option<u64>,
+    /// Folder for the work folder of the model.
+    pub work_dir: RawPath,
+}
+
+/// A line of a worker.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(tag = "event", rename_all = "snake_case")]
+pub enum Report {
+    /// A stage is under way.
+    Working {
+        /// Which.
+        stage: Stage,
+        /// How much of it is done, 0..1.
+        share: f64,
+    },
+    /// The job is done, well or not; nothing follows.
+    Ended(Box<Ending>),
+}
+
+/// What came of a job.
+#[derive(Debug, Serialize, Deserialize)]
+pub struct Ending {
+    /// The result.
+    pub made: Made,
+    /// The input as it was read, if it could be.
+    pub input: Option<Stamped>,
+    /// Peak resident memory of the worker, where the kernel tells it.
+    pub peak_bytes: Option<u64>,
+    /// Processor time of the worker, seconds.
+    pub cpu_seconds: f64,
+}
+
+/// The result of a job.
+#[derive(Debug, Serialize, Deserialize)]
+#[serde(tag = "made", rename_all = "snake_case")]
+pub enum Made {
+    /// What a repair would take.
+    Estimate(Box<Estimate>),
+    /// The model was repaired.
+    Repaired {
+        /// What came of it.
+        outcome: Box<Outcome>,
+        /// The files that were put in place.
+        files: Vec<OutputFile>,
+    },
+    /// Nothing is wrong with the model, so it was copied.
+    Copied {
+        /// The files that were put in place.
+        files: Vec<OutputFile>,
+    },
+    /// There is no result.
+    Nothing {
+        /// Whose fault it is.
+        blame: Blame,
+        /// What went wrong, in one line.
+        message: String,
+        /// Whether a disk is full: other models will meet the same.
+        is_disk_full: bool,
+    },
+}
+
+/// A file that was put in place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct OutputFile {
+    /// Where.
+    pub path: RawPath,
+    /// What it was then.
+    pub stamped: Stamped,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::ffi::OsStr;
+
+    #[test]
+    fn names_that_are_no_text_survive() {
+        let path = Path::new(OsStr::from_bytes(b"a/\xff \n\"b"));
+        let line = serde_json::to_string(&RawPath::new(path)).expect("plain data");
+        assert!(!line.contains('\n'));
+        let back: RawPath = serde_json::from_str(&line).expect("what was written");
+        assert_eq!(back.to_path(), path);
+    }
+}

@@ -1,0 +1,102 @@
+//! What a worker process does with a job.
+//!
+//! In:         a [`Job`]. Out: an [`Ending`]; the result, if there is one, is in its place.
+//! Invariant:  whatever the model is, the answer is an ending; what kills the process is told by
+//!             the system to the batch.
+//! Memory:     that of the job, held by the repair.
+
+use std::path::{Path, PathBuf};
+
+use crate::catalogue::copy::copy_if_sound;
+use crate::catalogue::job::{Ending, Job, Made, OutputFile, RawPath, Task};
+use crate::catalogue::stamp::{Stamp, Stamped};
+use crate::io::{Format, library_name};
+use crate::monitor::Monitor;
+use crate::repair::{Blame, Limits, Outcome, RepairError, estimate, repair};
+
+/// Does what `job` asks for. The caller fills in what the kernel knows of the process.
+#[must_use]
+pub fn do_job(job: &Job, monitor: &dyn Monitor) -> Ending {
+    let input_path = job.input.to_path();
+    let mut input = None;
+    let made = match job.task {
+        Task::Estimate => predict(job, &input_path, monitor),
+        Task::Repair | Task::RepairBroken => {
+            // Before it is read for the repair: a later change makes the stamp fit no longer.
+            input = Stamped::read(&input_path, &|| monitor.cancelled()).ok();
+            make(job, &input_path, monitor)
+        }
+    };
+    let made = made.unwrap_or_else(|error| nothing(&error));
+    Ending { made, input, peak_bytes: None, cpu_seconds: 0.0 }
+}
+
+fn limits_of(job: &Job) -> Limits {
+    Limits {
+        max_memory_bytes: job.max_memory_bytes,
+        threads: job.threads,
+        max_disk_bytes: job.max_disk_bytes,
+        work_dir: Some(job.work_dir.to_path()),
+        ..Limits::default()
+    }
+}
+
+fn predict(job: &Job, input: &Path, monitor: &dyn Monitor) -> Result<Made, RepairError> {
+    let limits = limits_of(job);
+    let estimate = estimate(input, job.format, &job.settings, &limits, monitor)?;
+    Ok(Made::Estimate(Box::new(estimate)))
+}
+
+fn make(job: &Job, input: &Path, monitor: &dyn Monitor) -> Result<Made, RepairError> {
+    let (output, limits) = (job.output.to_path(), limits_of(job));
+    let before = Stamp::at(input);
+    if job.task == Task::RepairBroken && copy_if_sound(input, &output, job.format, &limits, monitor)? {
+        if Stamp::at(input) != before {
+            return Err(RepairError::InputChanged { path: input.to_path_buf() });
+        }
+        return Ok(Made::Copied { files: stamp(&[output])? });
+    }
+    let outcome = repair(input, &output, job.format, &job.settings, &limits, monitor)?;
+    let files = stamp(&files_of(&output, job.format, &outcome))?;
+    Ok(Made::Repaired { outcome: Box::new(outcome), files })
+}
+
+/// The files of a result: beside an OBJ file lies its library.
+fn files_of(output: &Path, format: Format, outcome: &Outcome) -> Vec<PathBuf> {
+    let mut files = vec![output.to_path_buf()];
+    let library = output.with_file_name(library_name(output));
+    let has_library = outcome.transfer.surfaces != crate::contour::SurfaceDetail::None;
+    if format == Format::Obj && has_library {
+        files.push(library);
+    }
+    files
+}
+
+/// What was put in place is known again by this; stopping now would lose it.
+fn stamp(files: &[PathBuf]) -> Result<Vec<OutputFile>, RepairError> {
+    let stamped = files.iter().map(|path| {
+        Ok(OutputFile { path: RawPath::new(path), stamped: Stamped::read(path, &|| false)? })
+    });
+    stamped.collect()
+}
+
+/// An error as the batch is told of it: cause after cause in one line.
+fn nothing(error: &RepairError) -> Made {
+    let mut message = error.to_string();
+    let mut is_disk_full = false;
+    let mut source: Option<&dyn std::error::Error> = Some(error);
+    while let Some(cause) = source {
+        is_disk_full |= cause.downcast_ref().is_some_and(is_full);
+        source = cause.source();
+        if let Some(cause) = source {
+            message.push_str(&format!(": {cause}"));
+        }
+    }
+    Made::Nothing { blame: error.blame(), message, is_disk_full }
+}
+
+/// The system's word for a full disk, whoever wraps it.
+fn is_full(error: &std::io::Error) -> bool {
+    use std::io::ErrorKind::{FileTooLarge, QuotaExceeded, StorageFull};
+    matches!(error.kind(), StorageFull | QuotaExceeded | FileTooLarge)
+}
