@@ -6,9 +6,11 @@ mod mix;
 pub mod morton;
 pub mod orientation;
 pub mod qef;
+pub mod signs;
 pub mod triangle_triangle;
 #[cfg(test)]
 mod triangle_triangle_tests;
+mod wide;
 
 pub use closest::closest_on_triangle;
 pub use ear_clipping::EarClipper;

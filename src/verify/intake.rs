@@ -5,12 +5,12 @@
 //! Invariant:  the degeneracy test is exact: a f64 filter with an error bound, then exact signs.
 //! Source:     Shewchuk 1997 (adaptive precision), for the filter's bound and exact signs.
 
-use crate::defect::{Defect, DegenerateTriangle, NonfiniteTriangle};
+use crate::defect::{Defect, DegenerateTriangle, MOST_PLACES, NonfiniteTriangle};
+use crate::geom::signs::{Signs, is_tame};
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::verify::cone::{Compensated, Cone};
-use crate::verify::intersect::{Intersections, Signs, is_tame};
-use crate::verify::places::MOST_PLACES;
+use crate::verify::intersect::Intersections;
 use crate::verify::tape::{Tape, is_whole, stop_if_asked};
 use crate::verify::{Proof, VerifyError};
 

@@ -3,8 +3,8 @@
 //! Invariant:  a vertex is good iff its records form exactly one cycle in which no neighbour occurs
 //!             twice. An edge is counted at its lower end, so once.
 
+use crate::defect::Smallest;
 use crate::store::StoreError;
-use crate::verify::places::Smallest;
 use crate::verify::spool::Spool;
 
 /// Next and previous vertex of a triangle, seen from its corner at the judged vertex.

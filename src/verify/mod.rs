@@ -45,7 +45,7 @@ use std::error::Error;
 
 use rayon::ThreadPool;
 
-use crate::defect::{Defect, IntersectingTriangles};
+use crate::defect::{Defect, IntersectingTriangles, Meeting};
 use crate::mesh::MeshSource;
 use crate::monitor::{Monitor, Stage};
 use crate::store::{Scratch, StoreError};
@@ -58,6 +58,9 @@ use crate::verify::stream::prove_sound;
 pub enum Outward {
     /// Every volume is positive: nothing is nested (fill rule `solid`).
     AllPositive,
+    /// Positive, or negative inside one other, three others, and so on: cavities are well, and so
+    /// are solids that overlap or lie in each other.
+    PositiveOrCavity,
     /// Positive outside, negative inside one other, positive inside two, and so on.
     AlternatesWithNesting,
     /// Nothing.
@@ -126,6 +129,7 @@ pub fn prove<'s, E: Error + Send>(
             enter_intersections(intersections, &mut found, pool, monitor)?;
             let mut proof = prover.judge()?;
             proof.intersecting_pairs = found.intersecting_pairs;
+            proof.meetings = found.meetings;
             proof.places.append(&mut found.places);
             proof
         }
@@ -142,9 +146,17 @@ fn enter_intersections(
 ) -> Result<(), StoreError> {
     let Some(intersections) = intersections else { return Ok(()) };
     let found = intersections.join(pool, monitor)?;
-    proof.intersecting_pairs = found.pairs;
-    proof.places.extend(found.places.iter().map(|&(triangles, position)| {
-        Defect::IntersectingTriangles(IntersectingTriangles { triangles, position })
-    }));
+    proof.intersecting_pairs = found.pairs.total();
+    proof.meetings = found.pairs;
+    let mut places = Vec::new();
+    for (meeting, found) in Meeting::ALL.into_iter().zip(&found.places) {
+        places.extend(found.iter().map(|&(triangles, position)| IntersectingTriangles {
+            triangles,
+            position,
+            meeting,
+        }));
+    }
+    places.sort_unstable_by_key(|pair| pair.triangles);
+    proof.places.extend(places.into_iter().map(Defect::IntersectingTriangles));
     Ok(())
 }

@@ -2,7 +2,7 @@
 
 use crate::defect::{
     BoundaryEdge, CoincidentVertices, Defect, EdgePlace, InconsistentEdge, InwardComponent,
-    NonmanifoldEdge, NonmanifoldVertex, VertexPlace,
+    NonmanifoldEdge, NonmanifoldVertex, Smallest, VertexPlace,
 };
 use crate::mesh::MeshSource;
 use crate::monitor::Monitor;
@@ -15,7 +15,7 @@ use crate::verify::intersect::Intersections;
 use crate::verify::link::Judgement;
 use crate::verify::nesting::{Nesting, nest};
 use crate::verify::numbering::number_positions;
-use crate::verify::places::{Positions, Smallest};
+use crate::verify::places::Positions;
 use crate::verify::positions::position_of;
 use crate::verify::spool::Spool;
 use crate::verify::tape::Tape;
@@ -175,18 +175,30 @@ impl<'p> Prover<'p> {
         };
         let components = measure.components()?;
         let chunk = (self.quarter_bytes / 4 / 64).max(16) as usize;
-        let (tape, monitor, nested) =
-            (&self.tape, self.monitor, self.outward == Outward::AlternatesWithNesting);
+        let (tape, monitor, outward) = (&self.tape, self.monitor, self.outward);
         let (mut inward, mut undecided) = (0, 0);
         let mut places = Smallest::new();
         each_block(&components, chunk, |components| {
-            let nestings = if nested && self.proof.components > 1 {
-                nest(components, tape, labels, monitor)?
+            // Only where it matters, and only what it matters for.
+            let asked: Vec<Component> = components
+                .iter()
+                .filter(|component| match outward {
+                    Outward::AlternatesWithNesting => true,
+                    Outward::PositiveOrCavity => component.side < 0,
+                    Outward::AllPositive | Outward::NotAsked => false,
+                })
+                .copied()
+                .collect();
+            let nested = if asked.is_empty() || self.proof.components <= 1 {
+                vec![Nesting::default(); asked.len()]
             } else {
-                vec![Nesting::default(); components.len()]
+                nest(&asked, tape, labels, monitor)?
             };
-            for (component, nesting) in components.iter().zip(nestings) {
-                match verdict(component, nesting) {
+            let mut nested = asked.iter().zip(nested).peekable();
+            for component in components {
+                let own = nested.next_if(|(asked, _)| asked.label == component.label);
+                let nesting = own.map_or(Nesting::default(), |(_, nesting)| nesting);
+                match verdict(component, nesting, outward) {
                     Some(true) => {}
                     Some(false) => {
                         inward += 1;
@@ -208,12 +220,13 @@ impl<'p> Prover<'p> {
 }
 
 /// Whether a component faces outward; an open one is not asked.
-fn verdict(component: &Component, nesting: Nesting) -> Option<bool> {
+fn verdict(component: &Component, nesting: Nesting, outward: Outward) -> Option<bool> {
     match component.side {
         OPEN => Some(true),
         UNDECIDED => None,
         0 => Some(false),
         _ if nesting.touches => None,
+        1 if outward == Outward::PositiveOrCavity => Some(true),
         side => Some((side < 0) == nesting.odd),
     }
 }

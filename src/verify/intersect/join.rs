@@ -102,8 +102,7 @@ impl Join<'_> {
         let mut last = None;
         while let Some(next) = pairs.next()? {
             if last != Some(next.pair) {
-                found.pairs += 1;
-                found.places.offer(next.pair, next.place);
+                found.count(next.pair, next.place, next.meeting);
                 last = Some(next.pair);
             }
         }

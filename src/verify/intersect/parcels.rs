@@ -11,10 +11,10 @@ use std::collections::HashMap;
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::geom::signs::Point;
 use crate::store::{Record, Scratch, Sorted, Sorter, StoreError};
 use crate::verify::intersect::arrival::{Arrival, Unpacked};
 use crate::verify::intersect::grid::{extent_of, key_of_cell};
-use crate::verify::intersect::signs::Point;
 use crate::verify::positions::{hash, key_of};
 use crate::verify::slots::mix;
 use crate::verify::spool::Spool;
