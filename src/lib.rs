@@ -22,6 +22,7 @@
 pub mod bridge;
 pub mod contour;
 pub mod defect;
+pub mod diagnose;
 pub mod geom;
 pub mod hidden;
 pub mod ingest;

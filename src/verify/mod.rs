@@ -32,7 +32,6 @@ mod positions;
 mod proof;
 mod prover;
 mod slots;
-mod spool;
 mod stream;
 mod tape;
 #[cfg(test)]

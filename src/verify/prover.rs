@@ -6,9 +6,9 @@ use crate::defect::{
 };
 use crate::mesh::MeshSource;
 use crate::monitor::Monitor;
-use crate::store::{Labels, Scratch, StoreError};
+use crate::store::{Labels, Scratch, Sequence, StoreError};
 use crate::verify::coincidence::find_coincident;
-use crate::verify::components::{Component, Measure, OPEN, UNDECIDED, each_block, unite};
+use crate::verify::components::{Component, Measure, OPEN, UNDECIDED, unite};
 use crate::verify::fans::judge_fans;
 use crate::verify::intake::{Intake, read};
 use crate::verify::intersect::Intersections;
@@ -17,7 +17,6 @@ use crate::verify::nesting::{Nesting, nest};
 use crate::verify::numbering::number_positions;
 use crate::verify::places::Positions;
 use crate::verify::positions::position_of;
-use crate::verify::spool::Spool;
 use crate::verify::tape::Tape;
 use crate::verify::{Outward, Proof, ProofOptions, VerifyError};
 
@@ -159,7 +158,7 @@ impl<'p> Prover<'p> {
     fn enter_orientation(
         &mut self,
         labels: &mut Labels,
-        unbalanced: &Spool<u32>,
+        unbalanced: &Sequence<u32>,
     ) -> Result<(), StoreError> {
         let [low, high] = self.proof.bounds.unwrap_or_default();
         let reach = low.iter().chain(&high).fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -178,7 +177,7 @@ impl<'p> Prover<'p> {
         let (tape, monitor, outward) = (&self.tape, self.monitor, self.outward);
         let (mut inward, mut undecided) = (0, 0);
         let mut places = Smallest::new();
-        each_block(&components, chunk, |components| {
+        components.each_block(chunk, |components| {
             // Only where it matters, and only what it matters for.
             let asked: Vec<Component> = components
                 .iter()

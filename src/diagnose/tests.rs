@@ -1,0 +1,1 @@
+//! Each defect on the smallest model that shows it.
