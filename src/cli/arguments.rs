@@ -247,7 +247,7 @@ fn parse_angle(text: &str) -> Result<f64, String> {
 }
 
 /// A unit by its name or its sign.
-fn parse_unit(text: &str) -> Result<LengthUnit, String> {
+pub fn parse_unit(text: &str) -> Result<LengthUnit, String> {
     let name = match text {
         "um" => "micron",
         "mm" => "millimeter",

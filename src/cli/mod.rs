@@ -4,6 +4,7 @@ mod allocator;
 mod arguments;
 mod estimate;
 mod exit_code;
+mod inspect;
 mod last_words;
 mod memory;
 mod progress;
@@ -33,6 +34,8 @@ struct Arguments {
 enum Command {
     /// Repair one model.
     Repair(repair::RepairArguments),
+    /// Tell what is wrong with models; changes nothing.
+    Inspect(inspect::InspectArguments),
     /// Tell what a repair will take: leaves, memory, disk, seconds.
     Estimate(estimate::EstimateArguments),
 }
@@ -45,6 +48,7 @@ pub fn run() -> std::process::ExitCode {
     let chatter = Chatter::new(arguments.quiet, arguments.verbose);
     match arguments.command {
         Command::Repair(arguments) => repair::run(&arguments, &chatter),
+        Command::Inspect(arguments) => inspect::run(&arguments, &chatter),
         Command::Estimate(arguments) => estimate::run(&arguments, &chatter),
     }
 }

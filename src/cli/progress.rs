@@ -35,6 +35,11 @@ impl Chatter {
         self.quiet
     }
 
+    /// Whether more than usual is told.
+    pub fn is_verbose(self) -> bool {
+        self.verbose > 0
+    }
+
     /// Says `text` unless told to be quiet.
     pub fn say(self, text: &str) {
         if !self.quiet {

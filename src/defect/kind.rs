@@ -145,4 +145,29 @@ impl DefectKind {
             Self::IsolatedVertex => "isolated vertices",
         }
     }
+
+    /// What a repair does to it, unless its settings say otherwise.
+    #[must_use]
+    pub const fn remedy(self) -> &'static str {
+        match self {
+            Self::NonfiniteTriangle | Self::WildFace | Self::ShortFace => "is dropped",
+            Self::BoundaryEdge => "is closed with its rim",
+            Self::OpenLoop => "a hole is filled; what is open on purpose gets walls",
+            Self::NonmanifoldEdge => "each sheet gets vertices of its own",
+            Self::InconsistentEdge | Self::InwardComponent => "what is inside is decided anew",
+            Self::NonmanifoldVertex => "each sheet gets a vertex of its own",
+            Self::IntersectingTriangles => "solids become one",
+            Self::OverlappingTriangles => "becomes one surface",
+            Self::DuplicateTriangle => "counts once",
+            Self::DegenerateTriangle => "has no part in the new surface",
+            Self::TJunction => "is closed: narrower than a cell",
+            Self::Fin => "is taken out",
+            Self::OpenShell => "holes are filled, a free sheet becomes a wall",
+            Self::ThinWall => "the grid gets deeper, or the wall thicker",
+            Self::HiddenShell | Self::IsolatedVertex => "is left out",
+            Self::TinyShell => "stays where it is larger than a cell",
+            Self::TouchingTriangles => "become one surface, or part",
+            Self::CoincidentVertices => "become one",
+        }
+    }
 }

@@ -6,7 +6,7 @@
 //! Invariant:  no pair is missed: a thing lies in all cells that its box meets, of a grid whose
 //!             cells are no smaller than it, so in eight at most; a probe in all cells of each grid
 //!             that has things.
-//! Memory:     half of the share for the sort, an eighth for things of a crowded cell, and those of
+//! Memory:     three eighths of the share for the sort, an eighth for things of a crowded cell, and those of
 //!             a cell that fit, 4 MiB at most.
 //! Source:     Ericson 2005, Real-time collision detection, 7.2.1 (hierarchical grids).
 
@@ -83,7 +83,7 @@ impl<'m> Near<'m> {
         let [low, high] = bounds;
         let longest = (0..3).map(|axis| high[axis] - low[axis]).fold(0.0, f64::max);
         let finest = (longest / f64::from(1 << BITS)).max(reach).max(f64::MIN_POSITIVE);
-        let sorter = Sorter::new(means.scratch, means.share_bytes / 2);
+        let sorter = Sorter::new(means.scratch, means.share_bytes / 8 * 3);
         Self { means, low, finest, margin, sorter, used: 0 }
     }
 

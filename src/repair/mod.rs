@@ -13,6 +13,8 @@ mod depth;
 mod error;
 mod estimate;
 mod finish;
+mod inspect;
+mod inspection;
 mod length;
 mod levels;
 mod lock;
@@ -31,6 +33,10 @@ mod workspace;
 pub use deeper::DepthTrial;
 pub use error::{Blame, RepairError};
 pub use estimate::{Bounds, Counts, DiskSteps, ESTIMATE_VERSION, Estimate, estimate};
+pub use inspect::inspect;
+pub use inspection::{
+    INSPECTION_VERSION, InspectSettings, Inspection, ModelSize, RepairCost, ToleranceReport,
+};
 pub use length::{Length, LengthError, Reach};
 pub use levels::Levels;
 pub use outcome::{
