@@ -3,7 +3,8 @@
 //! In:         the sides of triangles at edges that have not two.
 //! Out:        the boundary edges with their places; loops of them with their lengths.
 //! Invariant:  two boundary edges at a vertex follow each other if a fan of triangles has them at its
-//!             ends; so two holes that touch in a point are two loops.
+//!             ends: sheets that touch in a point have loops of their own, holes that touch in a
+//!             point are one.
 //! Memory:     three quarters of the share, and the wedges of one vertex.
 
 use bytemuck::{Pod, Zeroable};

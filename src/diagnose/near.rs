@@ -233,3 +233,60 @@ impl Held {
         near.try_for_each(|(_, at)| meet(probe, &self.things[at as usize]))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use std::collections::BTreeSet;
+
+    use super::*;
+    use crate::mesh::shapes::Random;
+    use crate::monitor::Void;
+    use crate::store::Scratch;
+
+    #[test]
+    fn no_pair_of_boxes_that_meet_is_missed() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let mut random = Random::new(7);
+        let margin = 0.004;
+        let mut thing = |sizes: [f64; 2]| -> Points {
+            let (at, size) = (random.point(), random.within(sizes[0], sizes[1]));
+            std::array::from_fn(|_| {
+                let by = random.point();
+                std::array::from_fn(|i| (at[i] + size * by[i]).clamp(-1.0, 1.0))
+            })
+        };
+        let things: Vec<Points> =
+            (0..600).map(|i| thing(if i % 20 == 0 { [0.3, 1.0] } else { [0.0, 0.03] })).collect();
+        let probes: Vec<Points> = (0..3000).map(|_| thing([0.0, 0.003])).collect();
+        let meets = |a: &Points, b: &Points| {
+            let ([a_low, a_high], [b_low, b_high]) = (box_of(a), box_of(b));
+            (0..3).all(|i| a_low[i] <= b_high[i] + margin && b_low[i] - margin <= a_high[i])
+        };
+        let mut expected = BTreeSet::new();
+        for (i, thing) in (0..).zip(&things) {
+            let near = (0..).zip(&probes).filter(|(_, probe)| meets(thing, probe));
+            expected.extend(near.map(|(j, _)| (j, i)));
+        }
+        assert!(expected.len() > 100, "{} pairs only", expected.len());
+        for share_bytes in [16 << 10, 8 << 20] {
+            let means = Means { scratch: &scratch, share_bytes, monitor: &Void };
+            let mut near = Near::new([[-1.0; 3], [1.0; 3]], (0.02, margin), &means);
+            for (i, &points) in (0..).zip(&things) {
+                near.add(i, [0; 3], points).expect("the scratch folder works");
+            }
+            for (j, &points) in (0..).zip(&probes) {
+                near.probe(j, [0; 3], points).expect("the scratch folder works");
+            }
+            let mut found = BTreeSet::new();
+            near.join(|probe, thing| {
+                if meets(&thing.points, &probe.points) {
+                    found.insert((probe.number, thing.number));
+                }
+                Ok(())
+            })
+            .expect("the scratch folder works");
+            assert_eq!(found, expected);
+        }
+    }
+}

@@ -105,9 +105,11 @@ impl Sight {
                 let z = if step[2] > 0 { SIDE - 1 - j } else { j };
                 let filled = self.filled.get(y, z);
                 let row = if step[1] == 0 && step[2] == 0 {
+                    // All beyond the last filled cell.
+                    let all = !0_u128;
                     match step[0] {
-                        1 => !0_u128.checked_shr(filled.leading_zeros()).unwrap_or(0),
-                        _ => !0_u128.checked_shl(filled.trailing_zeros()).unwrap_or(0),
+                        1 => all.checked_shl(SIDE as u32 - filled.leading_zeros()).unwrap_or(0),
+                        _ => all.checked_shr(SIDE as u32 - filled.trailing_zeros()).unwrap_or(0),
                     }
                 } else {
                     let (next_y, next_z) = (y as i32 + step[1], z as i32 + step[2]);
@@ -189,11 +191,11 @@ fn meets(corners: &[Point; 3], [low, high]: Range) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::shapes::{Random, cuboid, rotation, sphere, transform};
+    use crate::mesh::shapes::{Random, bounds, cuboid, rotation, sphere, transform};
 
     fn sees(shells: &[Vec<[Point; 3]>], at: usize) -> bool {
         let all: Vec<_> = shells.iter().flatten().copied().collect();
-        let mut sight = Sight::new(crate::mesh::shapes::bounds(&all)).expect("it has an extent");
+        let mut sight = Sight::new(bounds(&all)).expect("it has an extent");
         all.iter().for_each(|corners| sight.fill(corners));
         sight.look();
         shells[at].iter().any(|corners| sight.sees(corners))
