@@ -127,10 +127,6 @@ fn report(inspection: &Inspection, verbose: bool) -> String {
     for finding in inspection.notes() {
         write_finding(&mut text, finding, width, verbose);
     }
-    if inspection.undecided_components > 0 {
-        let count = inspection.undecided_components;
-        let _ = writeln!(text, "  {count} components of unknown orientation");
-    }
     match &inspection.repair {
         Some(cost) => write_cost(&mut text, cost, inspection),
         None => text.push_str("  repair: refused, no triangle with an area is left\n"),

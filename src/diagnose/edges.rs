@@ -2,7 +2,7 @@
 //!
 //! In:         the whole triangles of a model.
 //! Out:        triangles joined over all edges (shells), and over those of exactly two (patches);
-//!             the sides of triangles at all other edges.
+//!             the sides of triangles at edges that have not two, or two that run the same way.
 //! Invariant:  depends on the vertices alone.
 //! Memory:     three quarters of the share.
 
@@ -19,6 +19,8 @@ struct EdgeUse {
     ends: [u32; 2],
     /// Three times the triangle, and the corner that it begins at.
     side: u32,
+    /// 1 where the side runs from the first end, -1 from the second.
+    way: i32,
 }
 
 impl Record for EdgeUse {
@@ -28,7 +30,7 @@ impl Record for EdgeUse {
     }
 }
 
-/// A side at an edge that has not two triangles.
+/// A side at an edge that has not two triangles, one each way.
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct Side {
@@ -38,6 +40,8 @@ pub(crate) struct Side {
     pub(crate) triangles: u32,
     /// 1 for the first of them, else 0.
     pub(crate) is_first: u32,
+    /// 1 where as many triangles run along the edge one way as the other, else 0.
+    pub(crate) is_balanced: u32,
 }
 
 impl Record for Side {
@@ -69,7 +73,8 @@ impl Edges {
                 for corner in 0..3 {
                     let (a, b) = (triangle.vertices[corner], triangle.vertices[(corner + 1) % 3]);
                     let side = triangle.number as u32 * 3 + corner as u32;
-                    sorter.push(EdgeUse { ends: [a.min(b), a.max(b)], side })?;
+                    let way = if a < b { 1 } else { -1 };
+                    sorter.push(EdgeUse { ends: [a.min(b), a.max(b)], side, way })?;
                 }
             }
             Ok(())
@@ -79,27 +84,22 @@ impl Edges {
             shells: Unite::new(scratch, share_bytes / 8, triangles)?,
             patches: Unite::new(scratch, share_bytes / 8, triangles)?,
             sides: Sorter::new(scratch, share_bytes / 8),
-            more: Sequence::new(scratch, share_bytes / 64),
             count: 0,
+            first: [0; 2],
+            more: Sequence::new(scratch, share_bytes / 64),
+            triangles: 0,
+            balance: 0,
         };
         let mut sorted = sorter.finish()?;
-        // Of the edge at hand: its ends, its first two sides, and how many there are.
-        let mut edge = ([u32::MAX; 2], [0; 2], 0);
-        while let Some(EdgeUse { ends, side }) = sorted.next()? {
-            if ends != edge.0 {
-                joining.close(edge.1, edge.2)?;
-                edge = (ends, [side; 2], 1);
-                continue;
+        let mut ends = [u32::MAX; 2];
+        while let Some(next) = sorted.next()? {
+            if next.ends != ends {
+                joining.close()?;
+                ends = next.ends;
             }
-            edge.2 += 1;
-            if edge.2 == 2 {
-                edge.1[1] = side;
-            } else {
-                joining.more.push(side)?;
-            }
-            joining.shells.unite(edge.1[0] / 3, side / 3)?;
+            joining.add(next)?;
         }
-        joining.close(edge.1, edge.2)?;
+        joining.close()?;
         drop(sorted);
         joining.finish(means)
     }
@@ -109,32 +109,50 @@ struct Joining {
     shells: Unite,
     patches: Unite,
     sides: Sorter<Side>,
-    /// All but the first two sides of the edge at hand.
-    more: Sequence<u32>,
     count: u64,
+    /// Of the edge at hand: its first two sides, the others, how many there are, and how many more
+    /// run one way than the other.
+    first: [u32; 2],
+    more: Sequence<u32>,
+    triangles: u32,
+    balance: i64,
 }
 
 impl Joining {
-    /// Ends an edge with its first two sides.
-    fn close(&mut self, first: [u32; 2], triangles: u32) -> Result<(), StoreError> {
-        self.count += u64::from(triangles > 0);
-        match triangles {
-            0 => Ok(()),
-            2 => self.patches.unite(first[0] / 3, first[1] / 3),
-            _ => {
-                self.sides.push(Side { side: first[0], triangles, is_first: 1 })?;
-                if triangles > 1 {
-                    let sides = &mut self.sides;
-                    sides.push(Side { side: first[1], triangles, is_first: 0 })?;
-                    self.more.each_block(BLOCK, |block| {
-                        let mut more = block.iter();
-                        more.try_for_each(|&side| sides.push(Side { side, triangles, is_first: 0 }))
-                    })?;
-                    self.more.clear();
-                }
-                Ok(())
-            }
+    fn add(&mut self, EdgeUse { side, way, .. }: EdgeUse) -> Result<(), StoreError> {
+        match self.triangles {
+            0 => self.first = [side; 2],
+            1 => self.first[1] = side,
+            _ => self.more.push(side)?,
         }
+        self.triangles += 1;
+        self.balance += i64::from(way);
+        self.shells.unite(self.first[0] / 3, side / 3)
+    }
+
+    /// Ends the edge at hand.
+    fn close(&mut self) -> Result<(), StoreError> {
+        let triangles = std::mem::take(&mut self.triangles);
+        let is_balanced = u32::from(std::mem::take(&mut self.balance) == 0);
+        self.count += u64::from(triangles > 0);
+        let [first, second] = self.first;
+        if triangles == 2 {
+            self.patches.unite(first / 3, second / 3)?;
+        }
+        if triangles == 0 || triangles == 2 && is_balanced == 1 {
+            return Ok(());
+        }
+        let sides = &mut self.sides;
+        let mut list =
+            |side: u32, is_first: u32| sides.push(Side { side, triangles, is_first, is_balanced });
+        list(first, 1)?;
+        if triangles > 1 {
+            list(second, 0)?;
+            self.more
+                .each_block(BLOCK, |block| block.iter().try_for_each(|&side| list(side, 0)))?;
+            self.more.clear();
+        }
+        Ok(())
     }
 
     fn finish(self, means: &Means<'_>) -> Result<Edges, StoreError> {

@@ -21,6 +21,7 @@ mod error;
 mod fans;
 mod finding;
 mod hidden;
+mod inverted;
 mod isolated;
 mod loops;
 mod model;
@@ -114,6 +115,7 @@ pub fn diagnose(
     drop(patches);
     let mut shells = Shells::measure(model, &mut shells, &sides, means)?;
     drop(sides);
+    findings.push(inverted::find(model, &mut shells, means)?);
     findings.push(hidden::find(model, &mut shells, means)?);
     let (report, mut of_shells) = shells.report(tolerances.tiny, means)?;
     findings.append(&mut of_shells);

@@ -18,7 +18,7 @@ use crate::store::{Record, Sorter, StoreError, Table};
 /// Cells of the finest grid along an axis, as a power of two.
 const BITS: u32 = 20;
 /// Things of a cell that are held; the others are read again for every probe.
-const MOST_HELD: usize = 32 << 10;
+const MOST_HELD: usize = 16 << 10;
 
 /// Up to three points of a thing or a probe.
 pub(crate) type Points = [[f64; 3]; 3];
@@ -165,7 +165,7 @@ impl<'m> Near<'m> {
             }
             if placed.role == 0 {
                 if held.things.len() < MOST_HELD {
-                    held.things.push(placed);
+                    held.push(placed);
                 } else {
                     rest.push(placed)?;
                 }
@@ -185,33 +185,37 @@ impl<'m> Near<'m> {
 struct Held {
     margin: f64,
     things: Vec<Placed>,
-    /// Where their boxes begin, ascending, and which they are.
+    boxes: Vec<[[f64; 3]; 2]>,
+    /// Where the boxes begin, ascending, and which they are; empty until a probe comes.
     order: Vec<(f64, u32)>,
     axis: usize,
     /// The longest side along the axis.
     widest: f64,
 }
 
-/// As few are compared with every probe.
-const FEW: usize = 16;
-
 impl Held {
     fn clear(&mut self) {
         self.things.clear();
+        self.boxes.clear();
         self.order.clear();
     }
 
+    fn push(&mut self, thing: Placed) {
+        self.boxes.push(box_of(&thing.points));
+        self.things.push(thing);
+    }
+
     fn arrange(&mut self) {
-        let boxes: Vec<_> = self.things.iter().map(|thing| box_of(&thing.points)).collect();
+        let boxes = &self.boxes;
         let spread = |axis: usize| {
             let lows = || boxes.iter().map(|bounds| bounds[0][axis]);
             lows().fold(f64::MIN, f64::max) - lows().fold(f64::MAX, f64::min)
         };
         let spreads = [spread(0), spread(1), spread(2)];
-        self.axis = (0..3).max_by(|&a, &b| spreads[a].total_cmp(&spreads[b])).unwrap_or(0);
-        let axis = self.axis;
+        let axis = (0..3).max_by(|&a, &b| spreads[a].total_cmp(&spreads[b])).unwrap_or(0);
+        self.axis = axis;
         self.widest = boxes.iter().map(|b| b[1][axis] - b[0][axis]).fold(0.0, f64::max);
-        self.order = boxes.iter().map(|b| b[0][axis]).zip(0..).collect();
+        self.order.extend(boxes.iter().map(|b| b[0][axis]).zip(0..));
         self.order.sort_unstable_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
     }
 
@@ -220,17 +224,23 @@ impl Held {
         probe: &Placed,
         meet: &mut impl FnMut(&Placed, &Placed) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        if self.things.len() <= FEW {
-            return self.things.iter().try_for_each(|thing| meet(probe, thing));
-        }
         if self.order.len() != self.things.len() {
             self.arrange();
         }
-        let [low, high] = box_of(&probe.points).map(|corner| corner[self.axis]);
-        let (low, high) = (low - self.margin, high + self.margin);
-        let from = self.order.partition_point(|&(begin, _)| begin < low - self.widest);
-        let mut near = self.order[from..].iter().copied().take_while(|&(begin, _)| begin <= high);
-        near.try_for_each(|(_, at)| meet(probe, &self.things[at as usize]))
+        let [low, high] = box_of(&probe.points);
+        let (low, high) = (low.map(|x| x - self.margin), high.map(|x| x + self.margin));
+        let (from, to) = (low[self.axis] - self.widest, high[self.axis]);
+        let from = self.order.partition_point(|&(begin, _)| begin < from);
+        for &(begin, at) in &self.order[from..] {
+            if begin > to {
+                break;
+            }
+            let [near, far] = &self.boxes[at as usize];
+            if (0..3).all(|axis| near[axis] <= high[axis] && low[axis] <= far[axis]) {
+                meet(probe, &self.things[at as usize])?;
+            }
+        }
+        Ok(())
     }
 }
 

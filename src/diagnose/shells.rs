@@ -20,6 +20,10 @@ use crate::diagnose::loops::distance;
 use crate::diagnose::model::{Corners, Model};
 use crate::store::{Labels, Sequence, StoreError, Table};
 
+/// Error of a sum of triple products per term and magnitude: differences, products and sums round a
+/// dozen times, by half a unit in the last place each.
+const ROUNDING: f64 = 16.0 * f64::EPSILON;
+
 /// All shells.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct ShellReport {
@@ -62,7 +66,11 @@ pub(crate) struct Sums {
     low: [f64; 3],
     high: [f64; 3],
     pub(crate) area: f64,
-    six_volumes: f64,
+    pub(crate) six_volumes: f64,
+    /// The sum of the magnitudes of all products in it.
+    pub(crate) magnitude: f64,
+    /// Sides at edges that are not used alike both ways.
+    unbalanced_sides: u64,
     /// Sides at edges of one triangle.
     open_sides: u64,
     open_length: f64,
@@ -73,6 +81,12 @@ pub(crate) struct Sums {
     even_hinges: u64,
     /// Whether something of it is seen, 1 or 0.
     pub(crate) is_seen: u64,
+}
+
+/// The sum of the magnitudes of the products in a triple product.
+fn magnitude(a: DVec3, b: DVec3, c: DVec3) -> f64 {
+    let [a, b, c] = [a, b, c].map(DVec3::abs);
+    a.dot(DVec3::new(b.y * c.z + b.z * c.y, b.z * c.x + b.x * c.z, b.x * c.y + b.y * c.x))
 }
 
 /// The area of a triangle.
@@ -92,14 +106,16 @@ impl Sums {
         self.area += area_of(corners);
         let [a, b, c] = corners.map(|p| DVec3::from(p) - DVec3::from(self.position));
         self.six_volumes += a.dot(b.cross(c));
+        self.magnitude += magnitude(a, b, c);
         for (corner, axis) in corners.iter().flat_map(|p| (0..3).map(move |axis| (p, axis))) {
             self.low[axis] = self.low[axis].min(corner[axis]);
             self.high[axis] = self.high[axis].max(corner[axis]);
         }
         for (from, side) in sides.into_iter().enumerate() {
             let length = distance([corners[from], corners[(from + 1) % 3]]);
+            self.unbalanced_sides += side.map_or(0, |side| u64::from(side.is_balanced == 0));
             match side.map(|side| side.triangles) {
-                None => {}
+                None | Some(2) => {}
                 Some(1) => {
                     self.open_sides += 1;
                     self.open_length += length;
@@ -115,6 +131,12 @@ impl Sums {
 
     fn diagonal(&self) -> f64 {
         distance([self.low, self.high])
+    }
+
+    /// Whether it encloses a volume, and that is negative beyond rounding.
+    pub(crate) fn is_inverted(&self) -> bool {
+        self.unbalanced_sides == 0
+            && self.six_volumes < -ROUNDING * self.triangles as f64 * self.magnitude
     }
 
     fn open_share(&self) -> f64 {

@@ -1,8 +1,8 @@
 //! What can be seen from outside, in a grid of 128 cells a side.
 //!
 //! In:         triangles, one by one; then no more.
-//! Out:        whether something of a triangle is beside a cell from which a straight way leads out.
-//! Invariant:  a way is seen to be free only if no triangle meets any of its cells, along the 26
+//! Out:        whether a straight way leads out from a cell of a triangle.
+//! Invariant:  a way is free only if no triangle meets any of its cells but the first, along the 26
 //!             directions to the neighbours of a cell. Gaps narrower than a cell are closed.
 //! Memory:     1 MiB.
 
@@ -40,7 +40,7 @@ pub(crate) struct Sight {
     /// Cells per model unit.
     scale: f64,
     filled: Rows,
-    /// Cells beside those that see out.
+    /// Cells from which a straight way leads out.
     seen: Rows,
 }
 
@@ -74,42 +74,29 @@ impl Sight {
 
     /// Ends the input and looks along all directions.
     pub(crate) fn look(&mut self) {
-        let mut out = Rows::new();
         for direction in 0..27 {
             let step: [i32; 3] = [direction % 3 - 1, direction / 3 % 3 - 1, direction / 9 - 1];
             if step != [0; 3] {
-                self.look_along(step, &mut out);
-            }
-        }
-        // What is beside a cell that sees out, in any of the 26 directions.
-        for z in 0..SIDE {
-            for y in 0..SIDE {
-                let mut row = 0;
-                for z in z.saturating_sub(1)..=(z + 1).min(SIDE - 1) {
-                    for y in y.saturating_sub(1)..=(y + 1).min(SIDE - 1) {
-                        let near = out.get(y, z);
-                        row |= near | near << 1 | near >> 1;
-                    }
-                }
-                self.seen.0[SIDE * z + y] = row;
+                self.look_along(step);
             }
         }
     }
 
-    /// Adds the free cells from which the way along `step` is free.
-    fn look_along(&self, step: [i32; 3], out: &mut Rows) {
+    /// Notes the cells from which the way along `step` is free, whatever is in them.
+    fn look_along(&mut self, step: [i32; 3]) {
+        // Those that are free themselves, and their way is.
         let mut free = Rows::new();
         for i in 0..SIDE {
             for j in 0..SIDE {
                 let y = if step[1] > 0 { SIDE - 1 - i } else { i };
                 let z = if step[2] > 0 { SIDE - 1 - j } else { j };
                 let filled = self.filled.get(y, z);
-                let row = if step[1] == 0 && step[2] == 0 {
-                    // All beyond the last filled cell.
+                let way = if step[1] == 0 && step[2] == 0 {
+                    // All from the last filled cell on.
                     let all = !0_u128;
                     match step[0] {
-                        1 => all.checked_shl(SIDE as u32 - filled.leading_zeros()).unwrap_or(0),
-                        _ => all.checked_shr(SIDE as u32 - filled.trailing_zeros()).unwrap_or(0),
+                        1 => all << (SIDE as u32 - 1).saturating_sub(filled.leading_zeros()),
+                        _ => all >> (SIDE as u32 - 1).saturating_sub(filled.trailing_zeros()),
                     }
                 } else {
                     let (next_y, next_z) = (y as i32 + step[1], z as i32 + step[2]);
@@ -118,15 +105,14 @@ impl Sight {
                         true => free.get(next_y as usize, next_z as usize),
                         false => !0,
                     };
-                    let beyond = match step[0] {
+                    match step[0] {
                         1 => next >> 1 | 1 << (SIDE - 1),
                         -1 => next << 1 | 1,
                         _ => next,
-                    };
-                    beyond & !filled
+                    }
                 };
-                free.0[SIDE * z + y] = row;
-                out.0[SIDE * z + y] |= row;
+                free.0[SIDE * z + y] = way & !filled;
+                self.seen.0[SIDE * z + y] |= way;
             }
         }
     }

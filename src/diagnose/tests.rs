@@ -241,6 +241,45 @@ fn thin_walls_are_told_and_gaps_are_not() {
 }
 
 #[test]
+fn shells_that_are_inside_out_are_told_and_cavities_are_not() {
+    let mut random = Random::new(12);
+    let flipped = |shape: Vec<Corners>| -> Vec<Corners> {
+        shape.into_iter().map(|[a, b, c]| [a, c, b]).collect()
+    };
+    for _ in 0..5 {
+        let turn = rotation(&mut random);
+        let told = |shells: &[Vec<Corners>]| {
+            let soup = transform(&shells.concat(), turn, DVec3::new(7.0, 8.0, -9.0));
+            let found = finding(&diagnosis(&soup), DefectKind::InwardComponent).clone();
+            let mut firsts: Vec<_> = found
+                .places
+                .iter()
+                .map(|place| match place {
+                    Defect::InwardComponent(component) => component.triangle,
+                    other => panic!("{other}"),
+                })
+                .collect();
+            firsts.sort_unstable();
+            assert_eq!(firsts.len() as u64, found.count);
+            firsts
+        };
+        let (large, small) = (cuboid([-1.0; 3], [1.0; 3]), sphere([0.1; 3], 0.5, 3));
+        let beside = sphere([4.0, 0.0, 0.0], 1.0, 3);
+        assert!(told(&[large.clone(), small.clone(), beside.clone()]).is_empty(), "all outward");
+        assert!(told(&[large.clone(), flipped(small.clone())]).is_empty(), "a cavity");
+        assert_eq!(told(&[large.clone(), flipped(beside.clone())]), [12]);
+        assert_eq!(told(&[flipped(large.clone()), small.clone()]), [0]);
+        assert_eq!(told(&[flipped(large.clone()), flipped(small.clone())]), [0]);
+        // What is open has no inside, whichever way it faces.
+        assert!(told(&[flipped(large[1..].to_vec())]).is_empty());
+    }
+    // One that hangs on an open shell by a vertex is a shell of its own.
+    let mut soup = flipped(tetrahedron([0.0; 3], 1.0));
+    soup.push([[0.0; 3], [-1.0, 0.0, 0.0], [0.0, -1.0, 0.0]]);
+    assert_eq!(count(&diagnosis(&soup), DefectKind::InwardComponent), 1);
+}
+
+#[test]
 fn specks_are_tiny() {
     let mut soup = sphere([0.0; 3], 1.0, 6);
     soup.extend(tetrahedron([1.5, 0.0, 0.0], 0.002));

@@ -1,6 +1,7 @@
 //! Exact and small geometry: no files, no threads, no cells.
 
 mod closest;
+pub mod crossing;
 mod ear_clipping;
 mod mix;
 pub mod morton;

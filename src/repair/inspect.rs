@@ -62,7 +62,7 @@ pub fn inspect(
     // What was read has a fifth of the share.
     let options = ProofOptions {
         share_bytes: share_bytes / 2,
-        outward: Outward::PositiveOrCavity,
+        outward: Outward::NotAsked,
         intersections: true,
     };
     let mut open =
@@ -189,7 +189,6 @@ fn conclude(
         shells: diagnosis.shells,
         rims: diagnosis.loops,
         findings,
-        undecided_components: proof.undecided_components,
         tolerances: ToleranceReport { thin, tiny, junction },
         repair,
     }
@@ -208,7 +207,6 @@ fn proved(proof: &Proof, [open, crowded]: [f64; 2], has_names: bool) -> Vec<Find
         DefectKind::InconsistentEdge,
         DefectKind::NonmanifoldVertex,
         DefectKind::DegenerateTriangle,
-        DefectKind::InwardComponent,
     ]
     .into_iter()
     .map(|kind| {

@@ -29,8 +29,8 @@ impl InspectSettings {
     pub const DEFAULT_THIN: Length = Length::Percent(0.2);
     /// Shells smaller than this share of the diagonal are told.
     pub const DEFAULT_TINY: Length = Length::Percent(0.5);
-    /// What rounding to single precision moves a vertex off its edge, with room.
-    pub const DEFAULT_JUNCTION: Length = Length::Percent(0.0001);
+    /// A hundred times what rounding to single precision moves a vertex off its edge.
+    pub const DEFAULT_JUNCTION: Length = Length::Percent(0.001);
 }
 
 impl Default for InspectSettings {
@@ -67,8 +67,6 @@ pub struct Inspection {
     pub rims: LoopReport,
     /// Its defects and remarks, worst first.
     pub findings: Vec<Finding>,
-    /// Closed components for which it could not be decided whether they face outward.
-    pub undecided_components: u64,
     /// The lengths that decided, model units.
     pub tolerances: ToleranceReport,
     /// What a repair with default settings would take; `None` where it would refuse.

@@ -57,9 +57,6 @@ use crate::verify::stream::prove_sound;
 pub enum Outward {
     /// Every volume is positive: nothing is nested (fill rule `solid`).
     AllPositive,
-    /// Positive, or negative inside one other, three others, and so on: cavities are well, and so
-    /// are solids that overlap or lie in each other.
-    PositiveOrCavity,
     /// Positive outside, negative inside one other, positive inside two, and so on.
     AlternatesWithNesting,
     /// Nothing.

@@ -174,30 +174,18 @@ impl<'p> Prover<'p> {
         };
         let components = measure.components()?;
         let chunk = (self.quarter_bytes / 4 / 64).max(16) as usize;
-        let (tape, monitor, outward) = (&self.tape, self.monitor, self.outward);
+        let (tape, monitor, nested) =
+            (&self.tape, self.monitor, self.outward == Outward::AlternatesWithNesting);
         let (mut inward, mut undecided) = (0, 0);
         let mut places = Smallest::new();
         components.each_block(chunk, |components| {
-            // Only where it matters, and only what it matters for.
-            let asked: Vec<Component> = components
-                .iter()
-                .filter(|component| match outward {
-                    Outward::AlternatesWithNesting => true,
-                    Outward::PositiveOrCavity => component.side < 0,
-                    Outward::AllPositive | Outward::NotAsked => false,
-                })
-                .copied()
-                .collect();
-            let nested = if asked.is_empty() || self.proof.components <= 1 {
-                vec![Nesting::default(); asked.len()]
+            let nestings = if nested && self.proof.components > 1 {
+                nest(components, tape, labels, monitor)?
             } else {
-                nest(&asked, tape, labels, monitor)?
+                vec![Nesting::default(); components.len()]
             };
-            let mut nested = asked.iter().zip(nested).peekable();
-            for component in components {
-                let own = nested.next_if(|(asked, _)| asked.label == component.label);
-                let nesting = own.map_or(Nesting::default(), |(_, nesting)| nesting);
-                match verdict(component, nesting, outward) {
+            for (component, nesting) in components.iter().zip(nestings) {
+                match verdict(component, nesting) {
                     Some(true) => {}
                     Some(false) => {
                         inward += 1;
@@ -219,13 +207,12 @@ impl<'p> Prover<'p> {
 }
 
 /// Whether a component faces outward; an open one is not asked.
-fn verdict(component: &Component, nesting: Nesting, outward: Outward) -> Option<bool> {
+fn verdict(component: &Component, nesting: Nesting) -> Option<bool> {
     match component.side {
         OPEN => Some(true),
         UNDECIDED => None,
         0 => Some(false),
         _ if nesting.touches => None,
-        1 if outward == Outward::PositiveOrCavity => Some(true),
         side => Some((side < 0) == nesting.odd),
     }
 }

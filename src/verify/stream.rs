@@ -102,7 +102,7 @@ fn conclude(mut intake: Intake, sound: Sound, outward: Outward) -> Option<Proof>
     let mut reach = intake.bounds.iter().flatten().flatten();
     let is_settled = match outward {
         Outward::NotAsked => true,
-        Outward::AllPositive | Outward::PositiveOrCavity => sound.doubtful == 0,
+        Outward::AllPositive => sound.doubtful == 0,
         Outward::AlternatesWithNesting => sound.doubtful == 0 && sound.components == 1,
     };
     if !is_settled || reach.any(|x| x.abs() > MOST_REACH) || sound.vertices > u64::from(u32::MAX) {
