@@ -351,7 +351,7 @@ fn memory_stays_within_the_budget() {
     const BUDGET: u64 = 64 << 20;
     let folder = folder();
     let model = folder.path().join("ball.obj");
-    // Without indices it is as large as the budget.
+    // Its triangles alone, with what is noted of each, are larger than the budget.
     let ball = sphere([0.0; 3], 1.0, 200);
     std::fs::write(&model, obj(&ball)).expect("writable");
     let mut command = Command::new(env!("CARGO_BIN_EXE_brickmend"));

@@ -359,6 +359,7 @@ fn links_in_the_documents_lead_somewhere() {
         "docs/format.md",
         "docs/outcome.md",
         "docs/estimate.md",
+        "docs/inspect.md",
         "docs/benchmarks/peers.md",
         "docs/glossary.md",
         "testdata/README.md",

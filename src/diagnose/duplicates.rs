@@ -6,7 +6,7 @@ use crate::defect::{Defect, DefectKind, DuplicateTriangle, Smallest};
 use crate::diagnose::Means;
 use crate::diagnose::finding::{Finding, Measure};
 use crate::diagnose::model::Model;
-use crate::diagnose::shells::area_of;
+use crate::diagnose::sums::area_of;
 use crate::store::{Record, Sorter, StoreError};
 
 #[derive(Clone, Copy, Pod, Zeroable)]

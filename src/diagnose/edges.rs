@@ -1,7 +1,7 @@
 //! Edges between vertices: what they join, and whose sides are rims or hang on others.
 //!
 //! In:         the whole triangles of a model.
-//! Out:        triangles joined over all edges (shells), and over those of exactly two (patches);
+//! Out:        triangles joined over all edges (shells), and over those of exactly two (sheets);
 //!             the sides of triangles at edges that have not two, or two that run the same way.
 //! Invariant:  depends on the vertices alone.
 //! Memory:     three quarters of the share.
@@ -56,7 +56,7 @@ pub(crate) struct Edges {
     /// Triangles joined over edges.
     pub(crate) shells: Labels,
     /// Triangles joined over edges of two.
-    pub(crate) patches: Labels,
+    pub(crate) sheets: Labels,
     /// Sides at all other edges, in the order of triangles.
     pub(crate) sides: Sequence<Side>,
     /// All edges.
@@ -82,7 +82,7 @@ impl Edges {
         let triangles = model.corners.len();
         let mut joining = Joining {
             shells: Unite::new(scratch, share_bytes / 8, triangles)?,
-            patches: Unite::new(scratch, share_bytes / 8, triangles)?,
+            sheets: Unite::new(scratch, share_bytes / 8, triangles)?,
             sides: Sorter::new(scratch, share_bytes / 8),
             count: 0,
             first: [0; 2],
@@ -107,7 +107,7 @@ impl Edges {
 
 struct Joining {
     shells: Unite,
-    patches: Unite,
+    sheets: Unite,
     sides: Sorter<Side>,
     count: u64,
     /// Of the edge at hand: its first two sides, the others, how many there are, and how many more
@@ -137,7 +137,7 @@ impl Joining {
         self.count += u64::from(triangles > 0);
         let [first, second] = self.first;
         if triangles == 2 {
-            self.patches.unite(first / 3, second / 3)?;
+            self.sheets.unite(first / 3, second / 3)?;
         }
         if triangles == 0 || triangles == 2 && is_balanced == 1 {
             return Ok(());
@@ -162,8 +162,8 @@ impl Joining {
             sides.push(side)?;
         }
         drop(sorted);
-        let (shells, patches) = (self.shells.finish()?, self.patches.finish()?);
-        Ok(Edges { shells, patches, sides, count: self.count })
+        let (shells, sheets) = (self.shells.finish()?, self.sheets.finish()?);
+        Ok(Edges { shells, sheets, sides, count: self.count })
     }
 }
 
