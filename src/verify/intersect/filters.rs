@@ -1,6 +1,6 @@
 //! Signs that are beyond all doubt of rounding, in plain f64.
 //!
-//! In:         tame points, see [`Signs`](crate::verify::intersect::Signs), and differences of them.
+//! In:         tame points, see [`Signs`](crate::geom::signs::Signs), and differences of them.
 //! Invariant:  a sign that is not 0 is the exact one.
 //! Source:     Shewchuk 1997 for the bounds.
 
