@@ -1,8 +1,8 @@
 //! Closed shells that are inside out: their volume is negative, and they are no cavity.
 //!
 //! Invariant:  a shell counts if all its edges are used alike both ways, its volume is negative beyond
-//!             what rounding can do, and a ray from its first point crosses all other shells an even
-//!             number of times, exactly. One that touches another there counts.
+//!             what rounding can do, and a ray from its first point crosses the other shells that enclose
+//!             a volume an even number of times, exactly.
 //! Memory:     a sixteenth of the share for the shells that are asked at one time.
 
 use crate::defect::{Defect, DefectKind, InwardComponent};
@@ -76,10 +76,9 @@ impl Tally {
             let (low, high) = (ys[0].min(ys[1]).min(ys[2]), ys[0].max(ys[1]).max(ys[2]));
             let from = asked.partition_point(|asked| asked.position[1] < low);
             for own in asked[from..].iter_mut().take_while(|asked| asked.position[1] <= high) {
-                if crossing(own.position, triangle.corners) == Crossing::Below
-                    && shells.of(triangle.number)? != own.shell
-                {
-                    own.is_inside ^= true;
+                if crossing(own.position, triangle.corners) == Crossing::Below {
+                    let other = shells.of(triangle.number)?;
+                    own.is_inside ^= other != own.shell && shells.sums(other)?.is_oriented();
                 }
             }
             Ok(())

@@ -95,10 +95,14 @@ impl Sums {
         distance([self.low, self.high])
     }
 
+    /// Whether every edge is used alike both ways, so that it encloses a volume.
+    pub(crate) fn is_oriented(&self) -> bool {
+        self.unbalanced_sides == 0
+    }
+
     /// Whether it encloses a volume, and that is negative beyond rounding.
     pub(crate) fn is_inverted(&self) -> bool {
-        self.unbalanced_sides == 0
-            && self.six_volumes < -ROUNDING * self.triangles as f64 * self.magnitude
+        self.is_oriented() && self.six_volumes < -ROUNDING * self.triangles as f64 * self.magnitude
     }
 
     pub(crate) fn open_share(&self) -> f64 {

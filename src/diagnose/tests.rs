@@ -270,7 +270,8 @@ fn shells_that_are_inside_out_are_told_and_cavities_are_not() {
         assert_eq!(told(&[large.clone(), flipped(beside.clone())]), [12]);
         assert_eq!(told(&[flipped(large.clone()), small.clone()]), [0]);
         assert_eq!(told(&[flipped(large.clone()), flipped(small.clone())]), [0]);
-        // What is open has no inside, whichever way it faces.
+        // What is open has no inside, whichever way it faces, and so no cavities.
+        assert_eq!(told(&[large[1..].to_vec(), flipped(small.clone())]), [11]);
         assert!(told(&[flipped(large[1..].to_vec())]).is_empty());
     }
     // One that hangs on an open shell by a vertex is a shell of its own.
