@@ -67,7 +67,7 @@ impl Edges {
     /// Finds all edges.
     pub(crate) fn find(model: &Model, means: &Means<'_>) -> Result<Self, StoreError> {
         let Means { scratch, share_bytes, .. } = *means;
-        let mut sorter = Sorter::new(scratch, share_bytes / 4);
+        let mut sorter = Sorter::new(scratch, share_bytes / 8);
         model.each(means, |triangle| {
             if triangle.is_whole() {
                 for corner in 0..3 {
@@ -81,9 +81,9 @@ impl Edges {
         })?;
         let triangles = model.corners.len();
         let mut joining = Joining {
-            shells: Unite::new(scratch, share_bytes / 8, triangles)?,
-            sheets: Unite::new(scratch, share_bytes / 8, triangles)?,
-            sides: Sorter::new(scratch, share_bytes / 8),
+            shells: Unite::scattered(scratch, share_bytes / 4, triangles)?,
+            sheets: Unite::scattered(scratch, share_bytes / 4, triangles)?,
+            sides: Sorter::new(scratch, share_bytes / 16),
             count: 0,
             first: [0; 2],
             more: Sequence::new(scratch, share_bytes / 64),

@@ -171,7 +171,7 @@ pub(crate) fn trace(
 /// Boundary edges that follow each other, by fans.
 fn join(model: &Model, rims: &Sequence<Rim>, means: &Means<'_>) -> Result<Labels, StoreError> {
     let Means { scratch, share_bytes, .. } = *means;
-    let mut at_rim = Table::<u64>::new(scratch, share_bytes / 8);
+    let mut at_rim = Table::<u64>::scattered(scratch, share_bytes / 8);
     if !rims.is_empty() {
         (0..model.space.div_ceil(64)).try_for_each(|_| at_rim.push(0))?;
     }
@@ -204,7 +204,7 @@ fn join(model: &Model, rims: &Sequence<Rim>, means: &Means<'_>) -> Result<Labels
         })?;
     }
     drop(at_rim);
-    let mut loops = Unite::new(scratch, share_bytes / 4, rims.len())?;
+    let mut loops = Unite::scattered(scratch, share_bytes / 4, rims.len())?;
     let mut sorted = wedges.finish()?;
     let mut group: Vec<Wedge> = Vec::new();
     let mut vertex = u32::MAX;

@@ -108,21 +108,23 @@ pub fn diagnose(
     findings.push(duplicates::find(model, means)?);
     findings.push(isolated::find(model, means)?);
     findings.push(model.coincident());
-    let Edges { mut shells, mut sheets, sides, count } = Edges::find(model, means)?;
-    let (rims, crowded_length) = loops::open_edges(model, &sides, means)?;
-    let (loops, mut of_loops) = loops::trace(model, &rims, means)?;
-    findings.append(&mut of_loops);
-    findings.push(t_junctions::find(&rims, tolerances.junction, model, means)?);
-    drop(rims);
+    // What a look needs no more goes before the next one begins: each has most of the share.
+    let Edges { shells: mut labels, mut sheets, sides, count } = Edges::find(model, means)?;
     findings.push(fins::find(model, &mut sheets, &sides, means)?);
     drop(sheets);
-    let mut shells = Shells::measure(model, &mut shells, &sides, means)?;
-    drop(sides);
+    let mut shells = Shells::measure(model, &mut labels, &sides, means)?;
+    drop(labels);
     findings.push(inverted::find(model, &mut shells, means)?);
     findings.push(hidden::find(model, &mut shells, means)?);
     let (report, mut of_shells) = shells.report(tolerances.tiny, means)?;
     findings.append(&mut of_shells);
     drop(shells);
+    let (rims, crowded_length) = loops::open_edges(model, &sides, means)?;
+    drop(sides);
+    let (loops, mut of_loops) = loops::trace(model, &rims, means)?;
+    findings.append(&mut of_loops);
+    findings.push(t_junctions::find(&rims, tolerances.junction, model, means)?);
+    drop(rims);
     findings.push(thin::find(model, tolerances.thin, means)?);
     findings.sort_by_key(|finding| finding.kind);
     Ok(Diagnosis { loops, shells: report, edges: count, crowded_length, findings })

@@ -3,7 +3,7 @@
 //! In:         triangles joined to sets; the sides of triangles at edges that have not two.
 //! Invariant:  sums are taken in the order of the file. Sets are numbered by their first triangles.
 //! Units:      model units; volumes are seen from the set's first corner.
-//! Memory:     three eighths of the share.
+//! Memory:     a quarter of the share.
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
@@ -133,8 +133,8 @@ impl Sets {
         sides: &Sequence<Side>,
         means: &Means<'_>,
     ) -> Result<Self, StoreError> {
-        let mut set_of = Table::new(means.scratch, means.share_bytes / 8);
-        let mut sums = Table::<Sums>::new(means.scratch, means.share_bytes / 4);
+        let mut set_of = Table::scattered(means.scratch, means.share_bytes / 8);
+        let mut sums = Table::<Sums>::scattered(means.scratch, means.share_bytes / 8);
         let mut reader = SideReader::new(sides);
         // The set at hand stays out of the table while its triangles come one after the other.
         let mut last: Option<(u32, Sums)> = None;
