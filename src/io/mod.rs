@@ -32,10 +32,11 @@ mod polygon;
 mod stl;
 #[cfg(test)]
 mod tests;
+mod textures;
 mod threemf;
 mod words;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use crate::io::detect::open_model;
 pub use crate::io::detect::{detect, format_of_extension};
@@ -45,11 +46,12 @@ pub use crate::io::obj::{LIBRARY_MARK, library_name, write_library};
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
 pub use crate::io::output::{ASIDE, check_output};
-pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
+pub use crate::io::palette::{IMAGES, MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
+pub use crate::io::textures::{ImageBeside, images_beside, lost_of_materials};
 use crate::io::threemf::{ThreeMfReader, ThreeMfWriter};
-use crate::mesh::{LengthUnit, MeshSink, MeshSource, SinkState};
+use crate::mesh::{Attributes, LengthUnit, MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
 /// The most triangles in one batch.
@@ -97,6 +99,16 @@ impl Format {
         matches!(self, Self::Obj | Self::Ply | Self::ThreeMf | Self::Glb)
     }
 
+    /// What the writer of this format can hold besides positions and materials.
+    #[must_use]
+    pub fn attributes(self) -> Attributes {
+        match self {
+            Self::Obj | Self::Glb => Attributes::ALL,
+            Self::Ply | Self::ThreeMf => Attributes { normals: false, ..Attributes::ALL },
+            Self::Stl | Self::Off => Attributes::NONE,
+        }
+    }
+
     /// Whether a reader of this format learns from it that the numbers are in `unit`.
     #[must_use]
     pub fn holds_unit(self, unit: LengthUnit) -> bool {
@@ -124,6 +136,11 @@ pub struct WriteOptions {
     pub palette: Option<Palette>,
     /// Whether triangles that close what was open are told apart.
     pub tag_patches: bool,
+    /// What vertices and corners will have besides; what [`Format::attributes`] lacks is not
+    /// written. With texture coordinates, materials show their images.
+    pub attributes: Attributes,
+    /// Where the output will be in the end: the ways to images lead from there.
+    pub output: PathBuf,
     /// What a model unit is, for formats that say so (3MF).
     pub unit: Option<LengthUnit>,
     /// File name of the material library beside an OBJ file, see [`library_name`].

@@ -7,6 +7,7 @@ use crate::contour::{Method, SurfaceDetail};
 use crate::io::{
     Format, LIBRARY_MARK, MATERIALS, Palette, WriteOptions, library_name, write_library,
 };
+use crate::mesh::Attributes;
 use crate::repair::RepairError;
 use crate::repair::outcome::TransferReport;
 use crate::repair::run::Run;
@@ -65,7 +66,14 @@ impl Run<'_> {
         };
         let library = library_name(&workspace.output_path());
         let unit = self.ruler(findings).unit;
-        Ok(WriteOptions { palette, tag_patches: self.settings.tag_patches, unit, library })
+        Ok(WriteOptions {
+            palette,
+            tag_patches: self.settings.tag_patches,
+            attributes: Attributes::NONE,
+            output: workspace.output_path(),
+            unit,
+            library,
+        })
     }
 
     /// Puts the material library of an OBJ file in its place, before the file.

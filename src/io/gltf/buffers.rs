@@ -204,7 +204,7 @@ impl Buffers {
 }
 
 /// An address with its percent signs resolved.
-fn unescaped(uri: &str) -> Vec<u8> {
+pub(crate) fn unescaped(uri: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let [first, after @ ..] = rest {

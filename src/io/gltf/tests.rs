@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::io::tests::{Content, read_all, read_bytes};
 use crate::io::{IoError, ReadOptions, open};
-use crate::mesh::Material;
+use crate::mesh::{Material, OtherMaps, Texture};
 use crate::store::Scratch;
 
 /// A GLB file.
@@ -265,7 +265,8 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         emissive: Some([2.0, 0.0, 0.0]),
         metallic: Some(1.0),
         roughness: Some(0.75),
-        texture: Some("a%20b.png".to_owned()),
+        texture: Some(Texture::Beside("a b.png".to_owned())),
+        other_maps: OtherMaps::default(),
     };
     let glass = Material {
         name: "glass".to_owned(),
