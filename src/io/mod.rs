@@ -12,6 +12,8 @@
 //! that Draco has compressed are decoded whole, and of 3MF a tag of up to 1 MiB is held. A writer
 //! holds 256 KiB for each file; that of GLB 4 MiB more in the end.
 
+#[cfg(test)]
+mod attribute_tests;
 mod beside;
 mod detect;
 mod error;

@@ -39,8 +39,7 @@ pub(crate) enum ImageKind {
 }
 
 impl ImageKind {
-    const ALL: [Self; 6] =
-        [Self::Png, Self::Jpeg, Self::WebP, Self::Ktx2, Self::Avif, Self::Other];
+    const ALL: [Self; 6] = [Self::Png, Self::Jpeg, Self::WebP, Self::Ktx2, Self::Avif, Self::Other];
 
     fn of(head: &[u8]) -> Self {
         let is = |at: usize, mark: &[u8]| head.get(at..).is_some_and(|h| h.starts_with(mark));
@@ -181,7 +180,11 @@ impl Textures {
             }
             Texture::Inside(image) => {
                 let Some(spool) = &self.inside else { return Ok(None) };
-                spool.read(image.first_byte, image.bytes.min(HEAD_BYTES as u64) as usize, &mut head)?;
+                spool.read(
+                    image.first_byte,
+                    image.bytes.min(HEAD_BYTES as u64) as usize,
+                    &mut head,
+                )?;
                 image.bytes
             }
         };

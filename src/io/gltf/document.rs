@@ -6,8 +6,8 @@
 use serde::Serialize;
 
 use crate::io::error::IoError;
-use crate::io::output::Output;
 use crate::io::gltf::values::ValuesLayout;
+use crate::io::output::Output;
 use crate::io::palette::Palette;
 use crate::io::textures::{ImageKind, Shown, Textures};
 use crate::mesh::{Material, Surface};

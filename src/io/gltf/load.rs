@@ -11,8 +11,8 @@ use serde::de::{
 use crate::io::error::{IoError, Place};
 use crate::io::gltf::materials;
 use crate::io::gltf::model::{
-    AccessorRecord, BufferRecord, ImageRecord, MeshRecord, Model, NONE, NodeRecord, PrimitiveRecord, ViewRecord,
-    origin,
+    AccessorRecord, BufferRecord, ImageRecord, MeshRecord, Model, NONE, NodeRecord,
+    PrimitiveRecord, ViewRecord, origin,
 };
 use crate::io::gltf::schema::{
     Accessor, Asset, Attributes, Buffer, BufferView, Image, Material, Mesh, Node, Primitive, Scene,
@@ -187,7 +187,9 @@ fn check_extension(model: &mut Model, name: String) -> Result<(), IoError> {
 fn add_buffer(model: &mut Model, buffer: Buffer) -> Result<(), IoError> {
     let uri = model.text(buffer.uri.as_deref())?;
     let length = buffer.byte_length;
-    let record = BufferRecord { length, start: 0, uri, origin: origin::UNKNOWN };
+    let is_bare = buffer.uri.is_none() && buffer.extensions.meshopt.is_some();
+    let origin = if is_bare { origin::COMPRESSED } else { origin::UNKNOWN };
+    let record = BufferRecord { length, start: 0, uri, origin };
     Ok(model.buffers.push(record)?)
 }
 

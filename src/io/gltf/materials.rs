@@ -3,9 +3,9 @@
 use bytemuck::Zeroable;
 
 use crate::io::error::IoError;
+use crate::io::gltf::buffers::unescaped;
 use crate::io::gltf::model::{MaterialRecord, Model, NONE};
 use crate::io::gltf::schema::Material as Stated;
-use crate::io::gltf::buffers::unescaped;
 use crate::io::gltf::schema::TextureInfo;
 use crate::io::gltf::text::DATA_MARK;
 use crate::mesh::{Image, Material, OtherMaps, Texture};

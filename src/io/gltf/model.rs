@@ -36,6 +36,8 @@ pub(crate) mod origin {
     pub(crate) const SEGMENT: u32 = 2;
     /// A file beside the model.
     pub(crate) const FILE: u32 = 3;
+    /// Nowhere: its views are compressed in a way that we do not read.
+    pub(crate) const COMPRESSED: u32 = 4;
 }
 
 /// A stretch of a buffer.

@@ -21,6 +21,15 @@ pub(crate) struct Asset {
 pub(crate) struct Buffer {
     pub(crate) uri: Option<String>,
     pub(crate) byte_length: u64,
+    #[serde(default)]
+    pub(crate) extensions: BufferExtensions,
+}
+
+/// Ways to leave out the bytes of a buffer.
+#[derive(Default, serde::Deserialize)]
+pub(crate) struct BufferExtensions {
+    #[serde(rename = "EXT_meshopt_compression", alias = "KHR_meshopt_compression")]
+    pub(crate) meshopt: Option<IgnoredAny>,
 }
 
 #[derive(serde::Deserialize)]

@@ -15,10 +15,10 @@ use crate::io::gltf::values::Values;
 use crate::io::output::{Aside, FACES, Output, VERTICES};
 use crate::io::palette::{Looks, Palette};
 use crate::io::textures::Textures;
+use crate::io::{Format, WriteOptions};
 use crate::mesh::{
     CornerForm, MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, Surface, VertexValues,
 };
-use crate::io::{Format, WriteOptions};
 use crate::store::{Record, Scratch, Sorter};
 
 /// For the order of the faces.

@@ -256,17 +256,15 @@ mod tests {
     fn the_head_has_one_size_for_all_counts() {
         for count in [0, 7, u64::MAX] {
             for has in [false, true] {
-                let layout = Layout {
-                    has_colours: has,
-                    has_uvs: has,
-                    has_textures: has,
-                    has_surfaces: has,
-                };
+                let layout =
+                    Layout { has_colours: has, has_uvs: has, has_textures: has, has_surfaces: has };
                 let head = head(count, count, layout);
                 assert_eq!(head.len(), HEAD_BYTES);
                 let text = String::from_utf8(head).expect("text");
                 assert!(text.contains(&format!("\nelement vertex {count}\n")));
-                assert!(text.starts_with("ply\nformat binary_little_endian 1.0\ncomment brickmend"));
+                assert!(
+                    text.starts_with("ply\nformat binary_little_endian 1.0\ncomment brickmend")
+                );
             }
         }
     }

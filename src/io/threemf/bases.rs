@@ -77,4 +77,3 @@ fn push_escaped(text: &mut Vec<u8>, name: &str) {
         }
     }
 }
-

@@ -25,13 +25,7 @@ pub(super) struct GroupParser {
 
 impl GroupParser {
     pub(super) fn new(part: u32) -> Self {
-        Self {
-            part,
-            ingredients: Vec::new(),
-            layer: None,
-            texture_layer: None,
-            texture: NOTHING,
-        }
+        Self { part, ingredients: Vec::new(), layer: None, texture_layer: None, texture: NOTHING }
     }
 
     /// Takes a tag, if it belongs to a group.

@@ -26,9 +26,7 @@ pub(super) fn content_types(has_images: bool) -> String {
 pub(super) fn relationships(kind: &str, targets: &[String]) -> String {
     let mut text = format!("{HEAD}<Relationships xmlns=\"{RELATIONSHIPS}\">");
     for (number, target) in targets.iter().enumerate() {
-        text += &format!(
-            "<Relationship Id=\"rel{number}\" Type=\"{kind}\" Target=\"{target}\"/>"
-        );
+        text += &format!("<Relationship Id=\"rel{number}\" Type=\"{kind}\" Target=\"{target}\"/>");
     }
     text + "</Relationships>\n"
 }

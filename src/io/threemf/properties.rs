@@ -113,11 +113,7 @@ impl Properties {
     }
 
     /// Adds a property to the group that was started last, with its texture coordinate.
-    pub(super) fn push(
-        &mut self,
-        definition: u32,
-        uv: Option<[f32; 2]>,
-    ) -> Result<(), StoreError> {
+    pub(super) fn push(&mut self, definition: u32, uv: Option<[f32; 2]>) -> Result<(), StoreError> {
         self.has_uvs |= uv.is_some();
         self.entries.push(Entry { definition, uv: uv.unwrap_or_default() })?;
         let last = self.groups.len() - 1;

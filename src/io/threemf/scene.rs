@@ -45,14 +45,8 @@ pub(super) struct Resource {
     is_component: u32,
 }
 
-const KINDS: [Kind; 6] = [
-    Kind::Missing,
-    Kind::Object,
-    Kind::Materials,
-    Kind::Bare,
-    Kind::Texture,
-    Kind::Foreign,
-];
+const KINDS: [Kind; 6] =
+    [Kind::Missing, Kind::Object, Kind::Materials, Kind::Bare, Kind::Texture, Kind::Foreign];
 
 impl Resource {
     pub(super) fn kind(&self) -> Kind {

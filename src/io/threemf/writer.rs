@@ -185,11 +185,8 @@ impl MeshSink for ThreeMfWriter {
         let is_large = mesh_bytes + paint_bytes + OTHER_BYTES > u64::from(u32::MAX);
         zip.start("3D/3dmodel.model", is_large)?;
         let unit = unit.name();
-        let colours = if self.attributes.any() {
-            format!(" xmlns:m=\"{MATERIALS}\"")
-        } else {
-            String::new()
-        };
+        let colours =
+            if self.attributes.any() { format!(" xmlns:m=\"{MATERIALS}\"") } else { String::new() };
         let model = format!("{HEAD}<model unit=\"{unit}\" xmlns=\"{CORE}\"{colours}>\n");
         zip.write(model.as_bytes())?;
         zip.write(b"<resources>\n")?;
@@ -207,11 +204,7 @@ fn too_large(output: &Output, what: &'static str) -> IoError {
     IoError::TooLarge { path: output.path().to_path_buf(), what, limit: MOST_INDICES }
 }
 
-fn write_object(
-    zip: &mut ZipFile,
-    records: &mut Aside,
-    paint: &mut Paint,
-) -> Result<(), IoError> {
+fn write_object(zip: &mut ZipFile, records: &mut Aside, paint: &mut Paint) -> Result<(), IoError> {
     let property = if paint.has_bases() { " pid=\"1\" pindex=\"0\"" } else { "" };
     zip.write(format!("<object id=\"2\" type=\"model\"{property}>\n<mesh>\n").as_bytes())?;
     let mut text = Vec::new();
