@@ -47,7 +47,9 @@ fn load(path: &Path, scratch: &Scratch) -> Model {
     for material in &mut content.materials {
         images.push(match &mut material.texture {
             None => None,
-            Some(Texture::Beside(name)) => std::fs::read(path.with_file_name(name)).ok(),
+            Some(Texture::Beside(name)) => {
+                std::fs::read(path.with_file_name(name.replace('\\', "/"))).ok()
+            }
             Some(Texture::Inside(image)) => {
                 let bytes = image_of(&mut source, image.number);
                 if !writer.place(image).expect("asked") {
@@ -127,8 +129,14 @@ fn write(
     }
     push(&mut sink, &model.content, start..batch.len());
     sink.finish().expect("finishes");
-    images_beside(format, &options, scratch, |image| image.write(&image.path, scratch))
-        .expect("written");
+    images_beside(
+        format,
+        &options,
+        scratch,
+        |error| error,
+        |image| image.write(&image.path, scratch),
+    )
+    .expect("written");
     if format == Format::Obj {
         let library = path.with_file_name(&options.library);
         write_library(&library, &model.palette, &options, scratch).expect("written");
@@ -271,10 +279,12 @@ fn obj_names_corners_by_their_lists_and_looks_by_their_material() {
     assert!(text.contains("\nf 1/1/1 2/2/2 3/3/3\n"));
     let library = std::fs::read_to_string(folder.path().join("looks.mtl")).expect("text");
     assert!(library.contains("\nmap_Kd maps/a skin.png\n"), "{library}");
+    // What is read there replaces the materials that were read before.
+    let other = tempfile::tempdir().expect("a temporary folder");
     for (format, ending) in FORMATS {
         let path = folder.path().join(format!("looks2.{ending}"));
         write(&model, (format, &path), None, &scratch);
-        let found = shown(&load(&path, &scratch));
+        let found = shown(&load(&path, &Scratch::new(other.path())));
         let jpegs = found.values().filter(|shown| shown.2.as_deref() == Some(JPEG)).count();
         assert_eq!(jpegs, 199, "{ending}");
     }
@@ -368,15 +378,21 @@ fn images_beside_an_output_are_recognised_by_their_content() {
     std::fs::create_dir(folder.path().join("out dir")).expect("a folder");
     let options = write(&model, (Format::Obj, &path), None, &scratch);
     let mut names = Vec::new();
-    images_beside(Format::Obj, &options, &scratch, |image| {
-        assert!(image.is_there()?);
-        names.push(image.path.file_name().expect("a name").to_owned());
-        std::fs::write(&image.path, b"\x89PNG another").expect("a file");
-        assert!(!image.is_there()?);
-        std::fs::remove_file(&image.path).expect("removed");
-        assert!(!image.is_there()?);
-        Ok::<_, IoError>(())
-    })
+    images_beside(
+        Format::Obj,
+        &options,
+        &scratch,
+        |error| error,
+        |image| {
+            assert!(image.is_there()?);
+            names.push(image.path.file_name().expect("a name").to_owned());
+            std::fs::write(&image.path, b"\x89PNG another").expect("a file");
+            assert!(!image.is_there()?);
+            std::fs::remove_file(&image.path).expect("removed");
+            assert!(!image.is_there()?);
+            Ok(())
+        },
+    )
     .expect("looked at");
     assert_eq!(names, ["b.texture-0.png", "b.texture-1.jpg"]);
     // An image of the input is referred to by the way from the output's folder.

@@ -342,19 +342,21 @@ impl ImageBeside<'_> {
 /// and the input has them inside.
 ///
 /// # Errors
-/// The palette cannot be read, or what `visit` says.
-pub fn images_beside<E: From<IoError>>(
+/// The palette cannot be read, as `of_io` says it, or what `visit` says.
+pub fn images_beside<E>(
     format: Format,
     options: &WriteOptions,
     scratch: &Scratch,
+    of_io: impl Fn(IoError) -> E,
     mut visit: impl FnMut(&ImageBeside) -> Result<(), E>,
 ) -> Result<(), E> {
     let (true, Some(palette)) = (refers(format, options.attributes), &options.palette) else {
         return Ok(());
     };
-    let mut textures = Textures::find(palette, format, scratch, |_| Ok(true))?;
+    let found = Textures::find(palette, format, scratch, |_| Ok(true));
+    let mut textures = found.map_err(&of_io)?;
     for number in 0..textures.count() as u32 {
-        let image = textures.image(number)?;
+        let image = textures.image(number).map_err(&of_io)?;
         if matches!(image.texture, Texture::Inside(_)) {
             let name = name_beside(&options.output, number, image.kind);
             let path = options.output.with_file_name(name.trim_start_matches("./"));
