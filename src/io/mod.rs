@@ -7,10 +7,17 @@
 //! written exactly (OBJ, PLY, OFF and 3MF as `f64`, STL and GLB rounded to `f32`). Units: model
 //! units.
 //!
+//! Inside, v of texture coordinates goes up. OBJ holds them, normals and colours (without alpha),
+//! GLB all of it, PLY and 3MF no normals; a triangle of 3MF has either an image or colours. GLB and
+//! 3MF hold the images of their materials (3MF PNG and JPEG, GLB also WebP, KTX 2 and AVIF), OBJ
+//! and PLY name them: those beside the input where they are, those inside of it beside the output.
+//! Each is one of a model in its own folder, or is left out and told.
+//!
 //! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB, 512 KiB for glTF), the names of parts and
 //! materials, and the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`, primitives
 //! that Draco has compressed are decoded whole, and of 3MF a tag of up to 1 MiB is held. A writer
-//! holds 256 KiB for each file; that of GLB 4 MiB more in the end.
+//! holds 256 KiB for each file, and the vertices of one call; those of GLB and 3MF 8 MiB more in the
+//! end.
 
 #[cfg(test)]
 mod attribute_tests;
