@@ -290,13 +290,16 @@ fn obj_names_corners_by_their_lists_and_looks_by_their_material() {
     }
 }
 
+/// The bytes of each material's image, and what was told to be lost.
+type Outcome = (Vec<Option<Vec<u8>>>, Vec<String>);
+
 /// What an output of materials with these textures shows and what it tells to be lost.
 fn outcome(
     textures: &[&str],
     format: Format,
     input: &Path,
     scratch: &Scratch,
-) -> Result<(Vec<Option<Vec<u8>>>, Vec<String>), IoError> {
+) -> Result<Outcome, IoError> {
     let mut writer = PaletteWriter::create(scratch)?;
     for (number, texture) in textures.iter().enumerate() {
         let texture = Some(Texture::Beside((*texture).to_owned()));

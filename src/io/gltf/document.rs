@@ -127,16 +127,15 @@ fn write_textures(output: &mut Output, layout: &mut Layout) -> Result<Vec<&'stat
     if count == 0 {
         return Ok(extensions);
     }
-    let mut view = 1 + u64::from(layout.values_bytes() > 0) + u64::from(layout.triangles > 0);
+    let first = 1 + u32::from(layout.values_bytes() > 0) + u32::from(layout.triangles > 0);
     output.write(br#","images":["#)?;
     for number in 0..count {
         let Shown { texture, kind, .. } = layout.textures.image(number)?;
         let name = serde_json::to_string(&texture.name()).expect("texts serialise");
         let comma = if number > 0 { "," } else { "" };
-        let media = kind.media_type();
+        let (view, media) = (first + number, kind.media_type());
         let image = format!(r#"{comma}{{"bufferView":{view},"mimeType":"{media}","name":{name}}}"#);
         output.write(image.as_bytes())?;
-        view += 1;
     }
     // 10497: images repeat.
     output.write(br#"],"samplers":[{"wrapS":10497,"wrapT":10497}],"textures":["#)?;

@@ -274,7 +274,6 @@ impl MeshSink for GlbWriter {
             aside: self.faces.state()?,
             vertices_aside: self.positions.state()?,
             values_aside,
-            ..SinkState::default()
         })
     }
 
