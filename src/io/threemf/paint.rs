@@ -93,7 +93,7 @@ impl Paint {
     ) -> Result<Self, IoError> {
         let mut used = Table::<u8>::new(scratch, SHARE_BYTES);
         let mut has_patches = false;
-        for_each_record(records, |record| {
+        let mut note = |record| {
             let (Record::Triangle(_, Some(surface)) | Record::Textured(_, surface, _)) = record
             else {
                 return Ok(());
@@ -103,7 +103,11 @@ impl Paint {
                 used.push(0)?;
             }
             Ok(used.set(surface.material().into(), 1)?)
-        })?;
+        };
+        // Without materials no record tells anything.
+        if palette.is_some() {
+            for_each_record(records, &mut note)?;
+        }
         let textures = match palette.filter(|_| attributes.uvs) {
             Some(palette) => Textures::find(palette, Format::ThreeMf, scratch, |material| {
                 let is_known = u64::from(material) < used.len();
