@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
 use crate::ingest::names::{PART_NAMES, write_materials, write_names};
-use crate::io::MATERIALS;
+use crate::io::{IMAGES, MATERIALS};
 use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
@@ -82,9 +82,9 @@ pub struct Soup {
     pub spool: Spool<SoupTriangle>,
     /// Texture coordinates and colours, where the file has any.
     pub attributes: Option<Spool<AttributeRecord>>,
-    /// The spools of the names of parts, see [`crate::ingest::PART_NAMES`], and of the materials,
-    /// see [`crate::io::MATERIALS`].
-    pub names: [FileState; 2],
+    /// The spools of the names of parts, see [`crate::ingest::PART_NAMES`], of the materials, see
+    /// [`crate::io::MATERIALS`], and of the images, see [`crate::io::IMAGES`].
+    pub names: [FileState; 3],
     /// What was found out.
     pub facts: SoupFacts,
 }
@@ -106,6 +106,7 @@ impl Soup {
             names: [
                 FileState::find(files, PART_NAMES)?.clone(),
                 FileState::find(files, MATERIALS)?.clone(),
+                FileState::find(files, IMAGES)?.clone(),
             ],
             facts,
         })
@@ -156,7 +157,9 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     stats.refuse_broken(strict)?;
     let (parts, materials) = (source.part_count(), source.material_count());
     let has_materials = has_materials(source)?;
-    let names = [write_names(source, resources)?, write_materials(source, resources)?];
+    let part_names = write_names(source, resources)?;
+    let [materials_state, images] = write_materials(source, resources)?;
+    let names = [part_names, materials_state, images];
     Ok(Soup {
         spool: writer.spool.finish()?,
         names,

@@ -27,6 +27,9 @@ pub struct SinkState {
     /// The vertices that wait beside it, likewise.
     #[serde(default)]
     pub vertices_aside: SinkFile,
+    /// What vertices have besides, likewise.
+    #[serde(default)]
+    pub values_aside: SinkFile,
 }
 
 /// What a sink wrote.

@@ -68,6 +68,9 @@ pub struct Findings {
     /// The threshold, cells, where it was raised for fewer triangles.
     raised_cells: Option<f64>,
     pub contour: ContourStats,
+    /// Images and maps of materials that the output does not show.
+    #[serde(default)]
+    pub(crate) lost_maps: Vec<String>,
     pub written: SinkStats,
     pub proof: Option<Proof>,
     /// The levels before the one under way.
@@ -211,6 +214,7 @@ impl Run<'_> {
         findings: &mut Findings,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
+        self.keep_images(workspace, findings)?;
         let soup = Soup::open(resources, &workspace.files(), *findings.soup())?;
         let (bins, measure) = fill_bins(&soup, findings.domain(), resources)?;
         findings.measure = measure;
@@ -358,6 +362,7 @@ impl Run<'_> {
         let start = WriteProgress::noted(resources);
         let (part, scratch) = (workspace.part(), resources.scratch);
         let write_options = self.write_options(workspace, findings)?;
+        findings.lost_maps = self.lost_maps(&write_options, workspace)?;
         let sink = match &start {
             Some(noted) => {
                 crate::io::reopen(part, self.format, scratch, &write_options, &noted.sink)

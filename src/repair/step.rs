@@ -6,7 +6,7 @@
 use crate::bridge::{ADDED, ADDED_ENTRIES, LEFT_OUT};
 use crate::contour::{CELLS, SURFACE};
 use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, PART_NAMES, SOUP};
-use crate::io::MATERIALS;
+use crate::io::{IMAGES, MATERIALS};
 use crate::monitor::Stage;
 use crate::octree::FLIPS;
 use crate::scan::HITS;
@@ -105,7 +105,7 @@ impl Step {
     /// The files that it leaves. `attributes.spool` is there only if the input has attributes.
     pub const fn writes(self) -> &'static [&'static str] {
         match self {
-            Self::Read => &[SOUP, ATTRIBUTES, PART_NAMES, MATERIALS],
+            Self::Read => &[SOUP, ATTRIBUTES, PART_NAMES, MATERIALS, IMAGES],
             Self::Bin => &[BINS, BIN_ENTRIES],
             Self::Settle => &[DROPS],
             Self::Mend => &[LEFT_OUT, ADDED, ADDED_ENTRIES],
@@ -125,7 +125,7 @@ impl Step {
     pub const fn reads(self) -> &'static [&'static str] {
         match self {
             Self::Read => &[],
-            Self::Bin => &[SOUP, PART_NAMES, MATERIALS],
+            Self::Bin => &[SOUP, PART_NAMES, MATERIALS, IMAGES],
             Self::Settle => &[BINS, BIN_ENTRIES],
             Self::Mend => &[BINS, BIN_ENTRIES, DROPS],
             Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
@@ -135,6 +135,7 @@ impl Step {
                 SOUP,
                 PART_NAMES,
                 MATERIALS,
+                IMAGES,
                 BINS,
                 BIN_ENTRIES,
                 LEFT_OUT,
@@ -148,8 +149,8 @@ impl Step {
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, BORDERS],
             Self::Choose | Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],
-            Self::Write => &[CELLS, SURFACE, MATERIALS],
-            Self::Prove => &[OUTPUT_PART, MATERIALS],
+            Self::Write => &[CELLS, SURFACE, MATERIALS, IMAGES],
+            Self::Prove => &[OUTPUT_PART, MATERIALS, IMAGES],
         }
     }
 

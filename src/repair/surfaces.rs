@@ -5,8 +5,10 @@ use std::path::{Path, PathBuf};
 
 use crate::contour::{Method, SurfaceDetail};
 use crate::io::{
-    Format, LIBRARY_MARK, MATERIALS, Palette, WriteOptions, library_name, write_library,
+    Format, IMAGES, ImageBeside, LIBRARY_MARK, MATERIALS, Palette, WriteOptions, images_beside,
+    library_name, lost_of_materials, write_library,
 };
+use crate::mesh::Attributes;
 use crate::repair::RepairError;
 use crate::repair::outcome::TransferReport;
 use crate::repair::run::Run;
@@ -42,10 +44,11 @@ impl Run<'_> {
             ),
         ];
         let lost = lost.iter().filter(|(is_lost, _)| *is_lost);
+        let lost = lost.map(|(_, what)| (*what).to_owned());
         TransferReport {
             surfaces,
             borders: findings.borders,
-            lost: lost.map(|(_, what)| (*what).to_owned()).collect(),
+            lost: lost.chain(findings.lost_maps.iter().cloned()).collect(),
         }
     }
 
@@ -58,14 +61,79 @@ impl Run<'_> {
         let palette = match self.surface_detail(findings) {
             SurfaceDetail::None => None,
             SurfaceDetail::Material | SurfaceDetail::MaterialAndPatch => {
-                let materials = workspace.files();
-                let state = FileState::find(&materials, MATERIALS)?;
-                Some(Palette::new(workspace.scratch(), state))
+                let files = workspace.files();
+                let palette =
+                    Palette::new(workspace.scratch(), FileState::find(&files, MATERIALS)?);
+                Some(palette.with_images(FileState::find(&files, IMAGES)?, self.input))
             }
         };
         let library = library_name(&workspace.output_path());
         let unit = self.ruler(findings).unit;
-        Ok(WriteOptions { palette, tag_patches: self.settings.tag_patches, unit, library })
+        Ok(WriteOptions {
+            palette,
+            tag_patches: self.settings.tag_patches,
+            attributes: Attributes::NONE,
+            output: workspace.output_path(),
+            unit,
+            library,
+        })
+    }
+
+    /// Images and maps of materials that the output does not show.
+    pub(crate) fn lost_maps(
+        &self,
+        options: &WriteOptions,
+        workspace: &Workspace,
+    ) -> Result<Vec<String>, RepairError> {
+        let Some(palette) = &options.palette else { return Ok(Vec::new()) };
+        lost_of_materials(palette, self.format, options, workspace.scratch())
+            .map_err(RepairError::Output)
+    }
+
+    /// Refuses outputs whose images would replace others, before any work is done for them.
+    pub(crate) fn keep_images(
+        &self,
+        workspace: &Workspace,
+        findings: &Findings,
+    ) -> Result<(), RepairError> {
+        let mut options = self.write_options(workspace, findings)?;
+        for level in &self.levels()[findings.finished.len()..] {
+            options.output.clone_from(&level.output);
+            self.each_image_to_put(&options, workspace, |_| Ok(()))?;
+        }
+        Ok(())
+    }
+
+    /// Puts the images that the output names, and the input has inside, beside the output.
+    pub(crate) fn put_images(
+        &self,
+        workspace: &Workspace,
+        findings: &Findings,
+    ) -> Result<(), RepairError> {
+        let options = self.write_options(workspace, findings)?;
+        let scratch = workspace.scratch();
+        self.each_image_to_put(&options, workspace, |image| {
+            workspace.put_beside(&image.path, |part| image.write(part, scratch))
+        })
+    }
+
+    /// Shows the images that are not in their place yet; what else is there stays.
+    fn each_image_to_put(
+        &self,
+        options: &WriteOptions,
+        workspace: &Workspace,
+        mut visit: impl FnMut(&ImageBeside) -> Result<(), RepairError>,
+    ) -> Result<(), RepairError> {
+        let scratch = workspace.scratch();
+        images_beside(self.format, options, scratch, RepairError::Output, |image| {
+            if image.is_there().map_err(RepairError::Output)? {
+                return Ok(());
+            }
+            if image.path.symlink_metadata().is_ok() {
+                return Err(RepairError::ForeignLibrary { path: image.path.clone() });
+            }
+            visit(image)
+        })
     }
 
     /// Puts the material library of an OBJ file in its place, before the file.
