@@ -4,11 +4,11 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use brickmend::geom::morton;
-use brickmend::ingest::AttributeRecord;
 use brickmend::octree::{
-    AXIS_EDGES, BinEntry, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick, FlipRecord,
-    HitBrick, HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle, SourcePlane,
-    TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index, encode,
+    AXIS_EDGES, AttributeRecord, BinEntry, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick,
+    FlipRecord, HitBrick, HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle,
+    SourcePlane, TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index,
+    encode,
 };
 use brickmend::scan::HAS_ODD_FACES;
 use brickmend::store::{
@@ -89,9 +89,10 @@ fn records_of_spools_are_as_documented() {
     check_record::<AttributeRecord>(
         "AttributeRecord",
         &[
+            offset_of!(AttributeRecord, corners),
             offset_of!(AttributeRecord, uvs),
             offset_of!(AttributeRecord, colours),
-            offset_of!(AttributeRecord, polygon),
+            offset_of!(AttributeRecord, unused),
         ],
     );
     check_record::<BinEntry>(

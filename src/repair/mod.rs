@@ -18,6 +18,7 @@ mod levels;
 mod lock;
 mod mending;
 mod outcome;
+mod painting;
 mod plan;
 mod revising;
 mod run;
@@ -39,4 +40,4 @@ pub use outcome::{
 };
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, HiddenRule, Limits, MaxHole, Settings, ThinRule};
+pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, Settings, ThinRule};

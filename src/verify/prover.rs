@@ -19,13 +19,14 @@ use crate::verify::places::{Positions, Smallest};
 use crate::verify::positions::position_of;
 use crate::verify::spool::Spool;
 use crate::verify::tape::Tape;
-use crate::verify::{Outward, Proof, ProofOptions, VerifyError};
+use crate::verify::{Outward, Proof, ProofOptions, VerifyError, Vertices};
 
 /// One proof under way.
 pub(crate) struct Prover<'p> {
     scratch: &'p Scratch,
     quarter_bytes: u64,
     outward: Outward,
+    vertices: Vertices,
     monitor: &'p dyn Monitor,
     tape: Tape,
     intake: Intake,
@@ -44,6 +45,7 @@ impl<'p> Prover<'p> {
             scratch,
             quarter_bytes,
             outward: options.outward,
+            vertices: options.vertices,
             monitor,
             tape: Tape::new(scratch, quarter_bytes),
             intake: Intake::default(),
@@ -57,7 +59,7 @@ impl<'p> Prover<'p> {
         source: &mut S,
         intersections: Option<&mut Intersections<'_>>,
     ) -> Result<(), VerifyError<S::Error>> {
-        self.intake = read(source, &mut self.tape, intersections, self.monitor)?;
+        self.intake = read(source, &mut self.tape, self.vertices, intersections, self.monitor)?;
         Ok(())
     }
 

@@ -1,0 +1,1 @@
+//! Tests of painting, against sinks of their own.
