@@ -10,6 +10,7 @@ use brickmend::octree::{
     SourcePlane, TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index,
     encode,
 };
+use brickmend::paint::{AskedPlace, DrawnCorner, DrawnTriangle};
 use brickmend::scan::HAS_ODD_FACES;
 use brickmend::store::{
     Backing, BrickFile, BrickWriter, DirectoryEntry, FORMAT_VERSION, Manifest, Scratch,
@@ -93,6 +94,32 @@ fn records_of_spools_are_as_documented() {
             offset_of!(AttributeRecord, uvs),
             offset_of!(AttributeRecord, colours),
             offset_of!(AttributeRecord, unused),
+        ],
+    );
+    check_record::<DrawnTriangle>(
+        "DrawnTriangle",
+        &[offset_of!(DrawnTriangle, indices), offset_of!(DrawnTriangle, surface)],
+    );
+    check_record::<DrawnCorner>(
+        "DrawnCorner",
+        &[
+            offset_of!(DrawnCorner, vertex),
+            offset_of!(DrawnCorner, triangle),
+            offset_of!(DrawnCorner, corner),
+            offset_of!(DrawnCorner, look),
+            offset_of!(DrawnCorner, others),
+            offset_of!(DrawnCorner, normal),
+            offset_of!(DrawnCorner, angle),
+        ],
+    );
+    check_record::<AskedPlace>(
+        "AskedPlace",
+        &[
+            offset_of!(AskedPlace, position),
+            offset_of!(AskedPlace, vertex),
+            offset_of!(AskedPlace, look),
+            offset_of!(AskedPlace, source),
+            offset_of!(AskedPlace, unused),
         ],
     );
     check_record::<BinEntry>(

@@ -29,11 +29,10 @@ mod tests;
 use crate::mesh::{Attributes, CornerForm, CornerValues, MeshSink, SinkTriangles, Surface};
 use crate::octree::AttributeRecord;
 use crate::paint::corners::{Answer, Painter};
-use crate::paint::drawing::DrawnTriangle;
 use crate::paint::values::pick_values;
 use crate::store::{Resources, Sorted, Spool, SpoolPeek, StoreError};
 
-pub use drawing::{DRAWN, Drawing, Drawn, no_drawing};
+pub use drawing::{AskedPlace, DRAWN, Drawing, Drawn, DrawnCorner, DrawnTriangle, no_drawing};
 pub use origins::Origins;
 
 /// Vertices or triangles that are handed on at one time.

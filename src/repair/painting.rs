@@ -8,7 +8,6 @@ use crate::mesh::{Attributes, MeshSink};
 use crate::paint::{Drawing, Drawn, Origins, PaintError, PaintOptions, no_drawing, paint};
 use crate::repair::RepairError;
 use crate::repair::run::Run;
-use crate::repair::settings::NormalRule;
 use crate::repair::stages::{Findings, Handles, open_bricks};
 use crate::repair::workspace::Workspace;
 use crate::store::{FileState, NoCheckpoints, Resources, Spool};
@@ -22,11 +21,9 @@ impl Run<'_> {
     /// The attributes that the output gets.
     pub(crate) fn attributes(&self, findings: &Findings) -> Attributes {
         let soup = findings.soup();
-        self.takes().and(Attributes {
-            uvs: soup.has_uvs,
-            colours: soup.has_colours,
-            normals: soup.has_normals || self.settings.normals == NormalRule::Smooth,
-        })
+        let given =
+            Attributes { uvs: soup.has_uvs, colours: soup.has_colours, normals: soup.has_normals };
+        self.settings.gets(self.format, given)
     }
 
     /// Whether crossings tell of their source triangles.

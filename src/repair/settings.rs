@@ -177,6 +177,12 @@ impl Settings {
         format.attributes().and(Attributes { uvs: has_sources, colours: has_sources, normals })
     }
 
+    /// The attributes that an output of `format` gets if the input has `given`.
+    pub(crate) fn gets(&self, format: Format, given: Attributes) -> Attributes {
+        let normals = given.normals || self.normals == NormalRule::Smooth;
+        self.takes(format).and(Attributes { normals, ..given })
+    }
+
     /// Refuses what cannot be, whatever the model.
     ///
     /// # Errors
