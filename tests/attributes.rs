@@ -327,7 +327,9 @@ fn normals_are_smooth_where_the_surface_is_round_and_hard_at_creases() {
         for (corners, normals) in normals_of(&repaired.path) {
             for (corner, normal) in corners.into_iter().zip(normals) {
                 let degrees = corner.normalize().dot(normal).clamp(-1.0, 1.0).acos().to_degrees();
-                assert!(degrees < 5.0, "{corner}: off by {degrees} degrees");
+                // Facets of clusters are as wide as the slack of decimation allows.
+                let most = if plain == unclustered(6) { 4.0 } else { 12.0 };
+                assert!(degrees < most, "{corner}: off by {degrees} degrees");
             }
         }
         let repaired =
@@ -383,7 +385,7 @@ fn a_vertex_of_glb_is_split_at_seams_and_creases_only() {
         }
     }
     let count = |splits: usize| uses.values().filter(|known| known.len() == splits).count();
-    assert_eq!(count(3), 8, "the corners of the cube");
+    assert_eq!(count(3), 8, "the corners of the cube, {}", count(4));
     assert!(count(2) > 12 && count(1) > 6 * count(2), "{} and {}", count(2), count(1));
     assert_eq!(count(1) + count(2) + count(3), uses.len());
     // The proof tells vertices apart by position.
@@ -427,8 +429,12 @@ fn triangles_with_squares_of_their_own_are_bounded_as_all_others() {
     let (outcome, found) = repair(&triangles, "obj", &at_depth(5));
     assert_eq!(outcome.transfer.looks, soup.len() as u64);
     for (_, uvs) in &found {
-        let tile = |uv: [f64; 2]| uv.map(|x| (x * 32.0 + 0.2).floor());
-        assert!(uvs.iter().all(|uv| tile(*uv) == tile(uvs[0])), "{uvs:?}");
+        // A square and a cell around it.
+        for axis in 0..2 {
+            let values = uvs.map(|uv| uv[axis]);
+            let spread = values.iter().fold(0.0, |most: f64, x| most.max((x - values[0]).abs()));
+            assert!(spread < 1.5 / 32.0, "{uvs:?}");
+        }
     }
 }
 
@@ -441,7 +447,7 @@ fn holes_and_walls_have_coordinates_of_what_is_around() {
     holed.remove(40);
     for triangles in [open_tube, holed] {
         let (outcome, found) = repair(&triangles, "glb", &at_depth(6));
-        assert!(outcome.mend.added_triangles > 0);
+        assert!(outcome.mend.added_triangles > 0, "{:?}", outcome.mend);
         for (corners, uvs) in &found {
             for (corner, uv) in corners.iter().zip(uvs) {
                 if uv[0] > 1.5 {

@@ -2,7 +2,8 @@
 //!
 //! Two triangles of one material have one look where they share an edge, and at both of its ends
 //! texture coordinates and nearly the colours. Where the image is folded along the edge, so that
-//! both lie on one side of it there, they have two. A look stands in the place of the material
+//! both lie on one side of it there, they have two. So they have on both sides of a seam, also where
+//! one can walk around it, as around a tube (`charts.rs`). A look stands in the place of the material
 //! wherever triangles are told apart, so seams stay where they were as borders of materials do.
 //!
 //! Materials that show no image are one look each, so that texture coordinates without a use part
@@ -12,15 +13,17 @@
 //! In:         the finite triangles with their attributes, and the materials.
 //! Out:        by triangle its look, by look its material.
 //! Invariant:  looks are numbered in the order in which triangles use them, whatever the share.
-//! Memory:     the share; 12 bytes for each triangle of one material and mapping on one edge.
+//! Memory:     the share; 24 bytes for each triangle of one material on one edge.
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::geom::mix;
+use crate::ingest::charts::Charts;
 use crate::ingest::error::IngestError;
 use crate::mesh::{MeshSource, OtherMaps};
 use crate::octree::{AttributeRecord, CLOSES, SoupTriangle, TRANSPARENT};
 use crate::store::{
-    Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError, Table, Unite,
+    Labels, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError, Table,
 };
 
 /// Spool of the looks of triangles, in the order of the soup; empty where there are none.
@@ -72,22 +75,14 @@ struct Side {
     colours: [[u8; 4]; 2],
     /// Number in the soup.
     triangle: u32,
-    unused: u32,
-}
-
-/// What sides must agree in.
-type Mapping = ([[u64; 3]; 2], u32, [[u32; 2]; 2]);
-
-impl Side {
-    fn mapping(&self) -> Mapping {
-        (self.ends, self.material, self.uvs)
-    }
+    /// A hash of the third corner: copies of a triangle have the same.
+    third: u32,
 }
 
 impl Record for Side {
-    type Key = (Mapping, u32, u32);
+    type Key = ([[u64; 3]; 2], u32, [[u32; 2]; 2], u32, u32);
     fn key(&self) -> Self::Key {
-        (self.mapping(), self.facing, self.triangle)
+        (self.ends, self.material, self.uvs, self.facing, self.triangle)
     }
 }
 
@@ -114,9 +109,9 @@ pub(super) fn find_looks<S: MeshSource + ?Sized>(
         }
         (0..3).try_for_each(|corner| sides.push(side(number, triangle, record, corner)))
     })?;
-    let mut looks = Unite::new(resources.scratch, share_bytes, soup.len())?;
-    join(sides, &mut looks, resources)?;
-    Ok(number_looks(soup, looks, &mut is_mapped, resources)?)
+    let mut charts = Charts::new(soup.len(), resources)?;
+    each_pair(sides, resources, |(pair, goes_on)| charts.add(pair, goes_on))?;
+    Ok(number_looks(soup, charts.finish()?, &mut is_mapped, resources)?)
 }
 
 /// Which materials show an image, or all if none does.
@@ -185,59 +180,104 @@ fn side(number: u32, triangle: &SoupTriangle, record: &AttributeRecord, corner: 
         facing: if turn > 0.0 { 1 } else { 2 * u32::from(turn < 0.0) },
         colours: [from, to].map(|i| record.colours[i]),
         triangle: number,
-        unused: 0,
+        third: place(third).into_iter().fold(0, |hash, bits| mix(hash ^ bits)) as u32,
     }
 }
 
-/// Unites triangles across sides.
-fn join(sides: Sorter<Side>, looks: &mut Unite, resources: &Resources) -> Result<(), StoreError> {
+/// A triangle at an edge.
+#[derive(Clone, Copy)]
+struct Use {
+    triangle: u32,
+    third: u32,
+    colours: [[u8; 4]; 2],
+}
+
+/// Visits pairs of triangles at all edges: those that go on into each other, and those that a seam
+/// parts.
+fn each_pair(
+    sides: Sorter<Side>,
+    resources: &Resources,
+    mut visit: impl FnMut(Pair) -> Result<(), StoreError>,
+) -> Result<(), StoreError> {
     let mut sorted = sides.finish()?;
     let mut next = sorted.next()?;
-    // Of one edge, by facing.
-    let mut uses: [Vec<(u32, [[u8; 4]; 2])>; 3] = Default::default();
+    let edge_of = |side: &Side| (side.ends, side.material);
+    // By mapping, and among these by facing.
+    let mut mappings: Vec<[Vec<Use>; 3]> = Vec::new();
     while let Some(first) = next {
         if resources.monitor.cancelled() {
             return Err(StoreError::Cancelled);
         }
-        uses.iter_mut().for_each(Vec::clear);
-        while let Some(side) = next.filter(|side| side.mapping() == first.mapping()) {
-            uses[side.facing as usize].push((side.triangle, side.colours));
+        mappings.clear();
+        let mut last = None;
+        while let Some(side) = next.filter(|side| edge_of(side) == edge_of(&first)) {
+            if last != Some(side.uvs) {
+                mappings.push(Default::default());
+                last = Some(side.uvs);
+            }
+            let mapping = mappings.last_mut().expect("pushed above");
+            let Side { triangle, third, colours, .. } = side;
+            mapping[side.facing as usize].push(Use { triangle, third, colours });
             next = sorted.next()?;
         }
-        let [flat, left, right] = &uses;
-        for (some, others) in [(left, right), (right, left), (flat, left), (flat, right)] {
-            unite(some, others, looks)?;
+        for [flat, left, right] in &mappings {
+            for (some, others) in
+                [(left, right), (right, left), (flat, left), (flat, right), (flat, flat)]
+            {
+                pair_up(some, others, &mut visit)?;
+            }
+            // Folded along the edge.
+            for alike in [left, right] {
+                part(&alike[alike.len().min(1)..], alike, &mut visit)?;
+            }
         }
-        unite(flat, flat, looks)?;
+        let whole = |mapping: &[Vec<Use>; 3]| mapping.concat();
+        for pair in mappings.windows(2) {
+            let [some, others] = [&pair[0], &pair[1]].map(whole);
+            part(&some, &others, &mut visit)?;
+            part(&others, &some, &mut visit)?;
+        }
     }
     Ok(())
 }
 
-/// Unites each of `some` with the first of `others` that it goes on into.
-fn unite(
-    some: &[(u32, [[u8; 4]; 2])],
-    others: &[(u32, [[u8; 4]; 2])],
-    looks: &mut Unite,
+/// Two triangles at an edge, and whether they go on into each other there.
+type Pair = ([u32; 2], bool);
+
+/// Pairs each of `some` with the first of `others`: across a seam where the colours jump.
+fn pair_up(
+    some: &[Use],
+    others: &[Use],
+    visit: &mut impl FnMut(Pair) -> Result<(), StoreError>,
 ) -> Result<(), StoreError> {
-    let Some((other, colours)) = others.first() else { return Ok(()) };
-    for (triangle, own) in some {
-        let (own, colours) = (own.as_flattened(), colours.as_flattened());
-        if own.iter().zip(colours).all(|(a, b)| a.abs_diff(*b) <= COLOUR_JUMP) {
-            looks.unite(*triangle, *other)?;
-        }
+    let Some(other) = others.first() else { return Ok(()) };
+    for one in some.iter().filter(|one| one.triangle != other.triangle) {
+        let (own, colours) = (one.colours.as_flattened(), other.colours.as_flattened());
+        let goes_on = own.iter().zip(colours).all(|(a, b)| a.abs_diff(*b) <= COLOUR_JUMP);
+        visit(([one.triangle, other.triangle], goes_on))?;
     }
     Ok(())
+}
+
+/// Parts each of `some` from the first of `others`, unless it is a copy of it.
+fn part(
+    some: &[Use],
+    others: &[Use],
+    visit: &mut impl FnMut(Pair) -> Result<(), StoreError>,
+) -> Result<(), StoreError> {
+    let Some(other) = others.first() else { return Ok(()) };
+    let some = some.iter().filter(|one| one.third != other.third);
+    some.into_iter().try_for_each(|one| visit(([one.triangle, other.triangle], false)))
 }
 
 /// Numbers the sets of triangles.
 fn number_looks(
     soup: &Spool<SoupTriangle>,
-    looks: Unite,
+    mut labels: Labels,
     is_mapped: &mut Table<u8>,
     resources: &Resources,
 ) -> Result<Looks, StoreError> {
     let share_bytes = resources.share_bytes / 4;
-    let mut labels = looks.finish()?;
     let mut of_triangles = SpoolWriter::create(resources.scratch, LOOKS)?;
     let mut materials = SpoolWriter::<u32>::create(resources.scratch, LOOK_MATERIALS)?;
     // By first triangle, and by material.

@@ -14,6 +14,7 @@
 
 mod area;
 mod bins;
+mod charts;
 mod crowds;
 mod duplicates;
 mod edges;

@@ -16,6 +16,10 @@ use crate::store::{FileState, Record, Resources, Scratch, Sorter, Spool, SpoolWr
 /// the attributes of source triangles are asked for, by source number.
 pub const DRAWN: [&str; 4] = ["drawn.vertices", "drawn.triangles", "drawn.corners", "drawn.places"];
 
+/// A triangle whose height is a smaller share of its longest side has no normal: three vertices on
+/// one crease.
+const LEAST_HEIGHT: f64 = 1e-4;
+
 /// A triangle of the surface. 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -189,7 +193,7 @@ impl Drawing {
         }
         let look = if self.has_looks { surface.material() } else { 0 };
         let [a, b, c] = corners.map(DVec3::from);
-        let normal = (b - a).cross(c - a).normalize_or_zero().as_vec3().to_array();
+        let normal = normal_of([a, b, c]).as_vec3().to_array();
         for (corner, (at, next, last)) in [(a, b, c), (b, c, a), (c, a, b)].into_iter().enumerate()
         {
             let (to_next, to_last) = (next - at, last - at);
@@ -226,6 +230,13 @@ impl Drawing {
         }
         Ok(())
     }
+}
+
+/// The unit normal; zero where the triangle is too narrow to have one.
+fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
+    let cross = (b - a).cross(c - a);
+    let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
+    if cross.length() <= LEAST_HEIGHT * longest { DVec3::ZERO } else { cross.normalize_or_zero() }
 }
 
 fn spool_sorted<R: Record>(

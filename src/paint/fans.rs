@@ -14,12 +14,22 @@ pub struct Fans {
     parts: Vec<usize>,
     /// Edges at the vertex: the other end, the corner, whether the edge leads there.
     edges: Vec<(u32, usize, bool)>,
+    /// Neighbours of which one has no normal at least.
+    narrow: Vec<[usize; 2]>,
+    /// Corners that belong to a part.
+    is_in: Vec<bool>,
 }
 
 impl Fans {
     /// Divided where the dihedral angle is larger, degrees.
     pub fn new(crease_deg: f64) -> Self {
-        Self { cosine: crease_deg.to_radians().cos(), parts: Vec::new(), edges: Vec::new() }
+        Self {
+            cosine: crease_deg.to_radians().cos(),
+            parts: Vec::new(),
+            edges: Vec::new(),
+            narrow: Vec::new(),
+            is_in: Vec::new(),
+        }
     }
 
     /// Of each corner around one vertex the first corner of its part.
@@ -39,16 +49,46 @@ impl Fans {
                 continue;
             }
             let [a, b] = [one, other].map(|at| normal_of(&corners[at]));
-            if a.dot(b) >= self.cosine {
-                let [a, b] = [one, other].map(|at| root(&mut self.parts, at));
-                self.parts[a.max(b)] = a.min(b);
+            if a == DVec3::ZERO || b == DVec3::ZERO {
+                self.narrow.push([one, other]);
+            } else if a.dot(b) >= self.cosine {
+                unite(&mut self.parts, one, other);
             }
         }
+        self.take_in_narrow(corners);
         for at in 0..self.parts.len() {
             self.parts[at] = self.parts[self.parts[at]];
         }
         &self.parts
     }
+
+    /// Gives triangles without a normal to one neighbour each, so that they join no two.
+    fn take_in_narrow(&mut self, corners: &[DrawnCorner]) {
+        let has_normal = |at: usize| normal_of(&corners[at]) != DVec3::ZERO;
+        self.is_in.clear();
+        self.is_in.extend((0..corners.len()).map(has_normal));
+        loop {
+            let waiting = self.narrow.len();
+            let (parts, is_in) = (&mut self.parts, &mut self.is_in);
+            self.narrow.retain(|&[one, other]| {
+                if is_in[one] != is_in[other] {
+                    unite(parts, one, other);
+                    (is_in[one], is_in[other]) = (true, true);
+                }
+                !(is_in[one] && is_in[other])
+            });
+            if self.narrow.len() == waiting {
+                break;
+            }
+        }
+        self.narrow.clear();
+    }
+}
+
+/// Joins the parts of two corners.
+fn unite(parts: &mut [usize], one: usize, other: usize) {
+    let [a, b] = [one, other].map(|at| root(parts, at));
+    parts[a.max(b)] = a.min(b);
 }
 
 /// The first of a part, with the way there made shorter.
