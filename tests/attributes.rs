@@ -180,7 +180,7 @@ fn tube(steps: u32) -> Vec<Textured> {
         for (z, turned) in [(0.0, true), (2.0, false)] {
             let (p, q) = (at(step, z), at(next, z));
             let corners = if turned { [[0., 0., z], q, p] } else { [[0., 0., z], p, q] };
-            triangles.push((corners, corners.map(|[x, y, _]| [2.0 + x, 2.0 + y])));
+            triangles.push((corners, corners.map(|[x, y, _]| [4.0 + x, 4.0 + y])));
         }
     }
     triangles
@@ -328,7 +328,7 @@ fn normals_are_smooth_where_the_surface_is_round_and_hard_at_creases() {
             for (corner, normal) in corners.into_iter().zip(normals) {
                 let degrees = corner.normalize().dot(normal).clamp(-1.0, 1.0).acos().to_degrees();
                 // Facets of clusters are as wide as the slack of decimation allows.
-                let most = if plain == unclustered(6) { 4.0 } else { 12.0 };
+                let most = if plain == unclustered(6) { 4.0 } else { 10.0 };
                 assert!(degrees < most, "{corner}: off by {degrees} degrees");
             }
         }
@@ -364,7 +364,8 @@ fn normals_are_kept_where_there_were_some_and_not_made_up() {
 
 #[test]
 fn a_vertex_of_glb_is_split_at_seams_and_creases_only() {
-    let (triangles, _) = cube(rotation(&mut Random::new(3)));
+    // Along the grid, where every crease is sharp.
+    let (triangles, _) = cube(DMat3::IDENTITY);
     let workshop = Workshop::new();
     let input = workshop.write_text("obj", &text_of(&workshop, &triangles));
     let settings = Settings { normals: NormalRule::Smooth, ..unclustered(5) };
@@ -385,7 +386,7 @@ fn a_vertex_of_glb_is_split_at_seams_and_creases_only() {
         }
     }
     let count = |splits: usize| uses.values().filter(|known| known.len() == splits).count();
-    assert_eq!(count(3), 8, "the corners of the cube, {}", count(4));
+    assert_eq!(count(3), 8, "the corners of the cube");
     assert!(count(2) > 12 && count(1) > 6 * count(2), "{} and {}", count(2), count(1));
     assert_eq!(count(1) + count(2) + count(3), uses.len());
     // The proof tells vertices apart by position.
@@ -447,7 +448,7 @@ fn holes_and_walls_have_coordinates_of_what_is_around() {
     holed.remove(40);
     for triangles in [open_tube, holed] {
         let (outcome, found) = repair(&triangles, "glb", &at_depth(6));
-        assert!(outcome.mend.added_triangles > 0, "{:?}", outcome.mend);
+        assert!(outcome.mend.added_triangles + outcome.invented.patch_polygons > 0);
         for (corners, uvs) in &found {
             for (corner, uv) in corners.iter().zip(uvs) {
                 if uv[0] > 1.5 {

@@ -110,6 +110,7 @@ fn records_of_spools_are_as_documented() {
             offset_of!(DrawnCorner, others),
             offset_of!(DrawnCorner, normal),
             offset_of!(DrawnCorner, angle),
+            offset_of!(DrawnCorner, height),
         ],
     );
     check_record::<AskedPlace>(

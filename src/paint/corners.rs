@@ -83,7 +83,7 @@ impl<'p, S: MeshSink + ?Sized> Painter<'p, S> {
             sink,
             resources,
             values,
-            fans: Fans::new(options.crease_deg),
+            fans: Fans::new(options.crease_deg, options.slack),
             answers: Sorter::new(resources.scratch, resources.share_bytes / 3),
             batch: Batch::default(),
             vertices: 0,

@@ -30,7 +30,7 @@ pub struct DrawnTriangle {
     pub surface: u32,
 }
 
-/// A corner of a triangle of the surface. 40 bytes.
+/// A corner of a triangle of the surface. 44 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct DrawnCorner {
@@ -48,6 +48,8 @@ pub struct DrawnCorner {
     pub normal: [f32; 3],
     /// The angle at the corner, radians.
     pub angle: f32,
+    /// The least height of the triangle, model units.
+    pub height: f32,
 }
 
 impl Record for DrawnCorner {
@@ -193,7 +195,8 @@ impl Drawing {
         }
         let look = if self.has_looks { surface.material() } else { 0 };
         let [a, b, c] = corners.map(DVec3::from);
-        let normal = normal_of([a, b, c]).as_vec3().to_array();
+        let (normal, height) = normal_and_height([a, b, c]);
+        let (normal, height) = (normal.as_vec3().to_array(), height as f32);
         for (corner, (at, next, last)) in [(a, b, c), (b, c, a), (c, a, b)].into_iter().enumerate()
         {
             let (to_next, to_last) = (next - at, last - at);
@@ -206,6 +209,7 @@ impl Drawing {
                 others: [indices[(corner + 1) % 3], indices[(corner + 2) % 3]],
                 normal,
                 angle: angle as f32,
+                height,
             })?;
         }
         self.triangles.push(DrawnTriangle { indices, surface: surface.bits() })
@@ -232,11 +236,13 @@ impl Drawing {
     }
 }
 
-/// The unit normal; zero where the triangle is too narrow to have one.
-fn normal_of([a, b, c]: [DVec3; 3]) -> DVec3 {
+/// The unit normal, zero where the triangle is too narrow to have one; and the least height.
+fn normal_and_height([a, b, c]: [DVec3; 3]) -> (DVec3, f64) {
     let cross = (b - a).cross(c - a);
-    let longest = a.distance_squared(b).max(b.distance_squared(c)).max(c.distance_squared(a));
-    if cross.length() <= LEAST_HEIGHT * longest { DVec3::ZERO } else { cross.normalize_or_zero() }
+    let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
+    let height = cross.length() / longest.max(f64::MIN_POSITIVE);
+    let is_narrow = height <= LEAST_HEIGHT * longest;
+    (if is_narrow { DVec3::ZERO } else { cross.normalize_or_zero() }, height)
 }
 
 fn spool_sorted<R: Record>(

@@ -6,10 +6,18 @@ use glam::DVec3;
 
 use crate::paint::drawing::DrawnCorner;
 
+/// Facets of a round surface whose vertices lie so far off it that their heights are this many times
+/// as much may meet at an angle of 1 radian: half by their vertices, half by its curvature.
+const BEND: f64 = 12.0;
+/// Edges of facets do not hide creases that are sharper, degrees.
+const MOST_BEND_DEG: f64 = 30.0;
+
 /// Room for one vertex after another.
 pub struct Fans {
     /// Dihedral angles with a smaller cosine divide.
     cosine: f64,
+    crease: f64,
+    slack: f64,
     /// Each corner's part, by the first corner in it.
     parts: Vec<usize>,
     /// Edges at the vertex: the other end, the corner, whether the edge leads there.
@@ -21,10 +29,14 @@ pub struct Fans {
 }
 
 impl Fans {
-    /// Divided where the dihedral angle is larger, degrees.
-    pub fn new(crease_deg: f64) -> Self {
+    /// Divided where the dihedral angle is larger, degrees, and larger than `slack` can bend facets of
+    /// one round surface.
+    pub fn new(crease_deg: f64, slack: f64) -> Self {
+        let crease = crease_deg.to_radians();
         Self {
-            cosine: crease_deg.to_radians().cos(),
+            cosine: crease.cos(),
+            crease,
+            slack,
             parts: Vec::new(),
             edges: Vec::new(),
             narrow: Vec::new(),
@@ -51,7 +63,9 @@ impl Fans {
             let [a, b] = [one, other].map(|at| normal_of(&corners[at]));
             if a == DVec3::ZERO || b == DVec3::ZERO {
                 self.narrow.push([one, other]);
-            } else if a.dot(b) >= self.cosine {
+            } else if a.dot(b) >= self.cosine
+                || a.dot(b) >= self.bent_cosine(corners[one].height.min(corners[other].height))
+            {
                 unite(&mut self.parts, one, other);
             }
         }
@@ -60,6 +74,12 @@ impl Fans {
             self.parts[at] = self.parts[self.parts[at]];
         }
         &self.parts
+    }
+
+    /// The cosine at which facets divide of which the smaller one has this height.
+    fn bent_cosine(&self, height: f32) -> f64 {
+        let bend = BEND * self.slack / f64::from(height).max(f64::MIN_POSITIVE);
+        self.crease.max(bend.min(MOST_BEND_DEG.to_radians())).cos()
     }
 
     /// Gives triangles without a normal to one neighbour each, so that they join no two.

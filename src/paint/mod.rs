@@ -49,6 +49,8 @@ pub struct PaintOptions {
     pub cell: f64,
     /// Normals differ across edges with a larger dihedral angle, degrees.
     pub crease_deg: f64,
+    /// How far the vertices of round surfaces may lie off them: that bends small triangles.
+    pub slack: f64,
 }
 
 /// What can go wrong.

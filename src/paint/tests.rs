@@ -125,7 +125,7 @@ fn painted(form: CornerForm, wanted: Attributes) -> Kept {
     };
     drawing.triangles(&triangles).expect("taken");
     let drawn = drawing.end().expect("drawn");
-    let options = PaintOptions { wanted, surfaces: true, cell: 0.25, crease_deg: 12.0 };
+    let options = PaintOptions { wanted, surfaces: true, cell: 0.25, crease_deg: 12.0, slack: 0.0 };
     let mut kept = Kept { form, ..Kept::default() };
     paint(&drawn, &records, &options, &mut kept, &resources).expect("painted");
     assert_eq!(kept.surfaces, surfaces);

@@ -87,6 +87,7 @@ impl Run<'_> {
             surfaces: self.surface_detail(findings) != SurfaceDetail::None,
             cell: findings.domain().cell_size(),
             crease_deg: self.settings.crease_deg,
+            slack: self.contour_options(findings).merged_cells() * findings.domain().cell_size(),
         };
         paint(&drawn, &sources, &options, sink, resources).map_err(|error| match error {
             PaintError::Store(error) => RepairError::Store(error),

@@ -99,7 +99,7 @@ const SOURCE_BYTES: f64 = 4.0;
 /// corners, a place where sources are asked; of these at most three for a triangle.
 const DRAWN_VERTEX_BYTES: f64 = 24.0;
 const DRAWN_TRIANGLE_BYTES: f64 = 16.0;
-const DRAWN_CORNERS_BYTES: f64 = 3.0 * 40.0;
+const DRAWN_CORNERS_BYTES: f64 = 3.0 * 44.0;
 const DRAWN_PLACES_BYTES: f64 = 3.0 * 40.0;
 /// What sources answer, and what corners get.
 const VALUES_BYTES: f64 = 3.0 * 32.0;
