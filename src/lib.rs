@@ -30,6 +30,7 @@ pub mod io;
 pub mod mesh;
 pub mod monitor;
 pub mod octree;
+pub mod paint;
 pub mod patch;
 pub mod repair;
 pub mod report;

@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Modules of the library by layer; a module imports from strictly lower layers only.
-const LAYERS: [(&str, u32); 19] = [
+const LAYERS: [(&str, u32); 20] = [
     ("monitor", 0),
     ("geom", 1),
     ("mesh", 2),
@@ -22,6 +22,7 @@ const LAYERS: [(&str, u32); 19] = [
     ("hidden", STAGE),
     ("contour", STAGE),
     ("transfer", STAGE),
+    ("paint", STAGE),
     ("verify", STAGE),
     ("diagnose", STAGE),
     ("repair", 5),

@@ -5,7 +5,9 @@ use std::path::PathBuf;
 use brickmend::contour::Method;
 use brickmend::ingest::SheetRule;
 use brickmend::mesh::LengthUnit;
-use brickmend::repair::{Depth, HiddenRule, Length, Limits, MaxHole, Reach, Settings, ThinRule};
+use brickmend::repair::{
+    Depth, HiddenRule, Length, Limits, MaxHole, NormalRule, Reach, Settings, ThinRule,
+};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
 
@@ -66,6 +68,10 @@ pub struct ResultArguments {
     /// in, and 3MF outputs say it. No number is changed.
     #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
     units: Option<LengthUnit>,
+    /// Which normals the output gets, in OBJ and GLB: smooth, but for creases (--crease), if the
+    /// input has some (keep) or always (smooth).
+    #[arg(long, value_enum, default_value_t = NormalRuleName::Keep)]
+    normals: NormalRuleName,
     /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ,
     /// PLY, 3MF and GLB.
     #[arg(long)]
@@ -130,6 +136,16 @@ enum HiddenRuleName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum NormalRuleName {
+    /// Normals where the input has some.
+    Keep,
+    /// Normals.
+    Smooth,
+    /// None.
+    None,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MethodName {
     /// Manifold dual contouring: creases and corners stay sharp.
     Mdc,
@@ -184,6 +200,11 @@ impl ResultArguments {
         let (crease_deg, strict) = (self.crease, self.strict);
         let (decimate, max_triangles) = (self.decimate, self.max_triangles);
         let method = self.method.into();
+        let normals = match self.normals {
+            NormalRuleName::Keep => NormalRule::Keep,
+            NormalRuleName::Smooth => NormalRule::Smooth,
+            NormalRuleName::None => NormalRule::None,
+        };
         Settings {
             depth,
             fill_rule,
@@ -198,6 +219,7 @@ impl ResultArguments {
             decimate,
             max_triangles,
             unit: self.units,
+            normals,
             tag_patches: self.tag_patches,
             strict,
         }

@@ -1,7 +1,9 @@
 //! What triangles may have besides a place and a material.
 
+use serde::{Deserialize, Serialize};
+
 /// Kinds of attributes, as those that a file has, holds or is to hold.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Attributes {
     /// Texture coordinates of corners.
     pub uvs: bool,

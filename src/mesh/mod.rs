@@ -16,7 +16,8 @@ pub use attributes::Attributes;
 pub use batch::{NO_POLYGON, Part, TriangleBatch};
 pub use material::{Material, Surface};
 pub use sink::{
-    CornerForm, CornerValues, MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, VertexValues,
+    CornerForm, CornerValues, DrawnFrom, InnerCrossing, MeshSink, SinkFile, SinkState, SinkStats,
+    SinkTriangles, VertexValues,
 };
 pub use source::{Discarded, MeshSource};
 pub use texture::{Image, OtherMaps, Texture};

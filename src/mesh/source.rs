@@ -75,6 +75,11 @@ pub trait MeshSource {
         None
     }
 
+    /// Whether the file has normals; known once the last batch was delivered.
+    fn has_normals(&self) -> bool {
+        false
+    }
+
     /// What was left out so far.
     fn discarded(&self) -> Discarded;
 

@@ -20,6 +20,7 @@ mod levels;
 mod lock;
 mod mending;
 mod outcome;
+mod painting;
 mod plan;
 mod revising;
 mod run;
@@ -45,4 +46,4 @@ pub use outcome::{
 };
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, HiddenRule, Limits, MaxHole, Settings, ThinRule};
+pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, Settings, ThinRule};

@@ -4,14 +4,15 @@ use std::io::{ErrorKind, Read};
 use std::path::{Path, PathBuf};
 
 use crate::contour::{Method, SurfaceDetail};
+use crate::ingest::LOOK_MATERIALS;
 use crate::io::{
     Format, IMAGES, ImageBeside, LIBRARY_MARK, MATERIALS, Palette, WriteOptions, images_beside,
     library_name, lost_of_materials, write_library,
 };
-use crate::mesh::Attributes;
 use crate::repair::RepairError;
 use crate::repair::outcome::TransferReport;
 use crate::repair::run::Run;
+use crate::repair::settings::NormalRule;
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
 use crate::store::FileState;
@@ -33,10 +34,13 @@ impl Run<'_> {
     /// What reached the output, and what did not.
     pub(crate) fn transfer_report(&self, findings: &Findings) -> TransferReport {
         let (soup, surfaces) = (findings.soup(), self.surface_detail(findings));
+        let attributes = self.attributes(findings);
+        let wants_normals = self.settings.normals != NormalRule::None;
         let lost = [
             (soup.has_materials && surfaces == SurfaceDetail::None, "materials"),
-            (soup.has_uvs, "texture coordinates"),
-            (soup.has_colours, "colours of vertices"),
+            (soup.has_uvs && !attributes.uvs, "texture coordinates"),
+            (soup.has_colours && !attributes.colours, "colours of vertices"),
+            (soup.has_normals && wants_normals && !attributes.normals, "normals"),
             (soup.parts > 1, "names of parts"),
             (
                 self.ruler(findings).unit.is_some_and(|unit| !self.format.holds_unit(unit)),
@@ -47,6 +51,8 @@ impl Run<'_> {
         let lost = lost.map(|(_, what)| (*what).to_owned());
         TransferReport {
             surfaces,
+            attributes,
+            looks: soup.looks,
             borders: findings.borders,
             lost: lost.chain(findings.lost_maps.iter().cloned()).collect(),
         }
@@ -64,7 +70,12 @@ impl Run<'_> {
                 let files = workspace.files();
                 let palette =
                     Palette::new(workspace.scratch(), FileState::find(&files, MATERIALS)?);
-                Some(palette.with_images(FileState::find(&files, IMAGES)?, self.input))
+                let palette = palette.with_images(FileState::find(&files, IMAGES)?, self.input);
+                Some(if self.has_sources(findings) {
+                    palette.with_looks(FileState::find(&files, LOOK_MATERIALS)?)
+                } else {
+                    palette
+                })
             }
         };
         let library = library_name(&workspace.output_path());
@@ -72,7 +83,7 @@ impl Run<'_> {
         Ok(WriteOptions {
             palette,
             tag_patches: self.settings.tag_patches,
-            attributes: Attributes::NONE,
+            attributes: self.attributes(findings),
             output: workspace.output_path(),
             unit,
             library,

@@ -63,6 +63,16 @@ pub enum Outward {
     NotAsked,
 }
 
+/// What tells vertices apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Vertices {
+    /// Their numbers, in files that have any.
+    #[default]
+    Numbers,
+    /// Their positions: of files that name a vertex several times, once for each attribute.
+    Positions,
+}
+
 /// How to prove.
 #[derive(Clone, Copy, Debug)]
 pub struct ProofOptions {
@@ -70,6 +80,8 @@ pub struct ProofOptions {
     pub share_bytes: u64,
     /// What orientation is asked.
     pub outward: Outward,
+    /// What tells vertices apart.
+    pub vertices: Vertices,
     /// Whether pairs of triangles that intersect are asked.
     pub intersections: bool,
 }

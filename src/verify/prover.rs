@@ -18,13 +18,14 @@ use crate::verify::numbering::number_positions;
 use crate::verify::places::Positions;
 use crate::verify::positions::position_of;
 use crate::verify::tape::Tape;
-use crate::verify::{Outward, Proof, ProofOptions, VerifyError};
+use crate::verify::{Outward, Proof, ProofOptions, VerifyError, Vertices};
 
 /// One proof under way.
 pub(crate) struct Prover<'p> {
     scratch: &'p Scratch,
     quarter_bytes: u64,
     outward: Outward,
+    vertices: Vertices,
     monitor: &'p dyn Monitor,
     tape: Tape,
     intake: Intake,
@@ -43,6 +44,7 @@ impl<'p> Prover<'p> {
             scratch,
             quarter_bytes,
             outward: options.outward,
+            vertices: options.vertices,
             monitor,
             tape: Tape::new(scratch, quarter_bytes),
             intake: Intake::default(),
@@ -56,7 +58,7 @@ impl<'p> Prover<'p> {
         source: &mut S,
         intersections: Option<&mut Intersections<'_>>,
     ) -> Result<(), VerifyError<S::Error>> {
-        self.intake = read(source, &mut self.tape, intersections, self.monitor)?;
+        self.intake = read(source, &mut self.tape, self.vertices, intersections, self.monitor)?;
         Ok(())
     }
 

@@ -244,7 +244,7 @@ fn add_mesh(model: &mut Model, mesh: Mesh) -> Result<(), IoError> {
 
 fn add_primitive(model: &mut Model, primitive: Primitive) -> Result<(), IoError> {
     let or_none = |number: Option<u32>| number.unwrap_or(NONE);
-    let Attributes { position, uv, second_uv, colour } = primitive.attributes;
+    let Attributes { position, uv, second_uv, colour, normal } = primitive.attributes;
     let record = PrimitiveRecord {
         // Triangles, where nothing is said.
         mode: primitive.mode.unwrap_or(4),
@@ -276,6 +276,7 @@ fn add_primitive(model: &mut Model, primitive: Primitive) -> Result<(), IoError>
     let has_triangles = is_triangles(record.mode) && position.is_some();
     model.has_uvs |= has_triangles && uv.or(second_uv).is_some();
     model.has_colours |= has_triangles && colour.is_some();
+    model.has_normals |= has_triangles && normal.is_some();
     Ok(model.primitives.push(record)?)
 }
 

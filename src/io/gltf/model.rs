@@ -179,6 +179,7 @@ pub(crate) struct Model {
     /// Whether any triangle has texture coordinates, or colours.
     pub(crate) has_uvs: bool,
     pub(crate) has_colours: bool,
+    pub(crate) has_normals: bool,
 }
 
 impl Model {
@@ -203,6 +204,7 @@ impl Model {
             segments: Segments::new(scratch, share_bytes / 64),
             has_uvs: false,
             has_colours: false,
+            has_normals: false,
         }
     }
 

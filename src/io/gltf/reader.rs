@@ -253,6 +253,10 @@ impl MeshSource for GltfReader {
         Some(LengthUnit::Meter)
     }
 
+    fn has_normals(&self) -> bool {
+        self.model.has_normals
+    }
+
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
         batch.clear();
         while batch.len() < BATCH_TRIANGLES {

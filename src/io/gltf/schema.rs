@@ -102,6 +102,8 @@ pub(crate) struct Attributes {
     pub(crate) second_uv: Option<u32>,
     #[serde(rename = "COLOR_0")]
     pub(crate) colour: Option<u32>,
+    #[serde(rename = "NORMAL")]
+    pub(crate) normal: Option<u32>,
 }
 
 #[derive(Default, serde::Deserialize)]

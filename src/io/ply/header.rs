@@ -78,6 +78,8 @@ pub(crate) enum Role {
     Patch,
     /// u or v of a vertex.
     Texture(usize),
+    /// x of a vertex's normal, which tells that there is one.
+    Normal,
     /// The texture coordinates of a face's corners, as a list.
     Coordinates,
     /// The number of a face's image.
@@ -207,6 +209,10 @@ impl Header {
         vertices.is_some_and(|e| e.has(Role::Texture(0)) && e.has(Role::Texture(1)))
     }
 
+    pub(crate) fn has_normals(&self) -> bool {
+        self.vertex_element().is_some_and(|at| self.elements[at].has(Role::Normal))
+    }
+
     pub(crate) fn has_colours(&self) -> bool {
         self.vertex_element().is_some_and(|at| self.elements[at].has(Role::Colour(0)))
     }
@@ -315,6 +321,7 @@ fn role(kind: Kind, is_list: bool, name: &[u8]) -> Role {
         (Kind::Vertex | Kind::Face, false, b"alpha" | b"diffuse_alpha") => Role::Colour(3),
         (Kind::Vertex, false, b"s" | b"u" | b"texture_u" | b"texture_s") => Role::Texture(0),
         (Kind::Vertex, false, b"t" | b"v" | b"texture_v" | b"texture_t") => Role::Texture(1),
+        (Kind::Vertex, false, b"nx") => Role::Normal,
         (Kind::Face, true, b"texcoord") => Role::Coordinates,
         (Kind::Face, false, b"texnumber") => Role::Image,
         (Kind::Face, false, b"material_index") => Role::Material,

@@ -152,6 +152,7 @@ impl PlyReader {
                 Role::Colour(channel) => colour[channel] = property.scalar.channel(number),
                 Role::Texture(axis) => uv[axis] = number as f32,
                 Role::Indices
+                | Role::Normal
                 | Role::Coordinates
                 | Role::Material
                 | Role::Image
@@ -235,6 +236,7 @@ impl PlyReader {
             }
             Role::Coordinate(_)
             | Role::Texture(_)
+            | Role::Normal
             | Role::Coordinates
             | Role::Indices
             | Role::Other => {}
@@ -364,6 +366,10 @@ impl MeshSource for PlyReader {
             Some(materials) if u64::from(number) < materials.count() => materials.get(number),
             _ => Ok(Material::default()),
         }
+    }
+
+    fn has_normals(&self) -> bool {
+        self.header.has_normals()
     }
 
     fn discarded(&self) -> Discarded {

@@ -11,7 +11,7 @@ use crate::monitor::Void;
 use crate::store::Scratch;
 use crate::verify::intersect::exact_pair::meet;
 use crate::verify::positions::key_of;
-use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
+use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
 
 /// A mesh with vertex numbers.
 #[derive(Clone, Default)]
@@ -99,7 +99,12 @@ pub(super) fn proof(mesh: &Mesh, indexed: bool, share_bytes: u64, threads: usize
     };
     let mut open =
         || -> Result<ProvedSource<'_, Infallible>, Infallible> { Ok(Box::new(source.clone())) };
-    let options = ProofOptions { share_bytes, outward: Outward::NotAsked, intersections: true };
+    let options = ProofOptions {
+        share_bytes,
+        outward: Outward::NotAsked,
+        vertices: Vertices::Numbers,
+        intersections: true,
+    };
     let pool = ThreadPoolBuilder::new().num_threads(threads).build().expect("threads");
     prove(&mut open, &scratch, &options, &pool, &Void).expect("nothing fails in memory")
 }
