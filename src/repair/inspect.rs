@@ -31,7 +31,7 @@ use crate::repair::plan::MemoryPlan;
 use crate::repair::settings::{Limits, Settings};
 use crate::repair::{Blame, RepairError};
 use crate::store::{Scratch, StoreError};
-use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, VerifyError, prove};
+use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, VerifyError, Vertices, prove};
 
 /// Tells what is wrong with the model at `input`, and what a repair would take.
 ///
@@ -63,6 +63,7 @@ pub fn inspect(
     let options = ProofOptions {
         share_bytes: share_bytes / 2,
         outward: Outward::NotAsked,
+        vertices: Vertices::Numbers,
         intersections: true,
     };
     let mut open =
