@@ -19,8 +19,8 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::geom::mix;
 use crate::ingest::charts::Charts;
-use crate::ingest::error::IngestError;
-use crate::mesh::{MeshSource, OtherMaps};
+use crate::io::{IoError, Palette};
+use crate::mesh::OtherMaps;
 use crate::octree::{AttributeRecord, CLOSES, SoupTriangle, TRANSPARENT};
 use crate::store::{
     Labels, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError, Table,
@@ -94,13 +94,13 @@ pub(super) fn no_looks(resources: &Resources) -> Result<Looks, StoreError> {
     })
 }
 
-/// Finds the looks of a soup; `source` tells its materials.
-pub(super) fn find_looks<S: MeshSource + ?Sized>(
-    source: &mut S,
+/// Finds the looks of a soup with these materials.
+pub(super) fn find_looks(
+    palette: &Palette,
     (soup, attributes): (&Spool<SoupTriangle>, &Spool<AttributeRecord>),
     resources: &Resources,
-) -> Result<Looks, IngestError<S::Error>> {
-    let mut is_mapped = mapped_materials(source, resources)?;
+) -> Result<Looks, IoError> {
+    let mut is_mapped = mapped_materials(palette, resources)?;
     let share_bytes = resources.share_bytes / 4;
     let mut sides = Sorter::<Side>::new(resources.scratch, 2 * share_bytes);
     each_triangle(soup, attributes, resources, |number, triangle, record| {
@@ -115,18 +115,14 @@ pub(super) fn find_looks<S: MeshSource + ?Sized>(
 }
 
 /// Which materials show an image, or all if none does.
-fn mapped_materials<S: MeshSource + ?Sized>(
-    source: &mut S,
-    resources: &Resources,
-) -> Result<Table<u8>, IngestError<S::Error>> {
+fn mapped_materials(palette: &Palette, resources: &Resources) -> Result<Table<u8>, IoError> {
     let mut is_mapped = Table::new(resources.scratch, resources.share_bytes / 16);
     let mut any = false;
-    for number in 0..source.material_count() as u32 {
-        let material = source.material(number).map_err(IngestError::Source)?;
+    palette.for_each(|_, material| {
         let shows = material.texture.is_some() || material.other_maps != OtherMaps::default();
         any |= shows;
-        is_mapped.push(u8::from(shows))?;
-    }
+        Ok(is_mapped.push(u8::from(shows))?)
+    })?;
     for number in 0..is_mapped.len() {
         if !any {
             is_mapped.set(number, 1)?;

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::error::IngestError;
 use crate::ingest::looks::{LOOK_MATERIALS, LOOKS, Looks, find_looks, no_looks};
 use crate::ingest::names::{PART_NAMES, write_materials, write_names};
-use crate::io::{IMAGES, MATERIALS};
+use crate::io::{IMAGES, IoError, MATERIALS, Palette};
 use crate::mesh::{Attributes, Discarded, LengthUnit, Material, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
 use crate::octree::{AttributeRecord, SnapBox, SoupTriangle, TRANSPARENT};
@@ -109,6 +109,19 @@ impl Soup {
         })
     }
 
+    /// Finds the looks of a soup that was read, where it has texture coordinates or colours.
+    ///
+    /// # Errors
+    /// The scratch disk fails, or the caller cancels.
+    pub fn part_looks(&mut self, resources: &Resources) -> Result<(), IoError> {
+        if !self.attributes.is_empty() {
+            let palette = Palette::new(resources.scratch, &self.names[1]);
+            self.looks = find_looks(&palette, (&self.spool, &self.attributes), resources)?;
+            self.facts.looks = self.looks.materials.len();
+        }
+        Ok(())
+    }
+
     /// The files, as they have to be found again.
     #[must_use]
     pub fn files(&self) -> Vec<FileState> {
@@ -160,11 +173,6 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     let [materials_state, images] = write_materials(source, resources)?;
     let names = [part_names, materials_state, images];
     let (spool, attributes) = (writer.spool.finish()?, writer.attributes.finish()?);
-    let looks = if attributes.is_empty() {
-        no_looks(resources)?
-    } else {
-        find_looks(source, (&spool, &attributes), resources)?
-    };
     Ok(Soup {
         spool,
         names,
@@ -178,10 +186,10 @@ pub fn read_soup<S: MeshSource + ?Sized>(
             has_uvs: writer.has_uvs,
             has_colours: writer.has_colours,
             has_normals: source.has_normals(),
-            looks: looks.materials.len(),
+            looks: 0,
             stats,
         },
-        looks,
+        looks: no_looks(resources)?,
     })
 }
 

@@ -68,6 +68,7 @@ impl Run<'_> {
                     WriteError::Contour(error) => RepairError::Contour(error),
                     WriteError::Sink(error) => RepairError::Store(error),
                 })?;
+        (handles.cells, handles.surface) = (None, None);
         Ok(drawing.end()?.files())
     }
 

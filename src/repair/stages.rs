@@ -203,8 +203,11 @@ impl Run<'_> {
         let options = ReadOptions { share_bytes: resources.share_bytes };
         let mut source =
             crate::io::open(self.input, resources.scratch, &options).map_err(RepairError::Input)?;
-        let soup = read_soup(&mut *source, self.settings.strict, self.takes(), resources)
+        let mut soup = read_soup(&mut *source, self.settings.strict, self.takes(), resources)
             .map_err(|e| RepairError::from_ingest(e, self.input))?;
+        // What the reader holds of the share is free from here on.
+        drop(source);
+        soup.part_looks(resources).map_err(RepairError::Input)?;
         self.check_unchanged()?;
         findings.soup = Some(soup.facts);
         if soup.spool.is_empty() {
