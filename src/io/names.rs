@@ -104,6 +104,7 @@ impl Materials {
             emissive: has(HAS_EMISSIVE).then_some(properties.emissive),
             metallic: has(HAS_METALLIC).then_some(properties.metallic),
             roughness: has(HAS_ROUGHNESS).then_some(properties.roughness),
+            alpha_cutoff: None,
             texture: texture.map(|number| self.texture(number)).transpose()?,
             other_maps: OtherMaps::from_bits((properties.flags >> MAPS_SHIFT) as u8),
         })

@@ -22,6 +22,9 @@ pub struct Material {
     pub metallic: Option<f32>,
     /// 0 for mirrors, 1 for chalk.
     pub roughness: Option<f32>,
+    /// Where the image lets more light pass than this it is not there at all (glTF `MASK`).
+    #[serde(default)]
+    pub alpha_cutoff: Option<f32>,
     /// Image of the base colour.
     pub texture: Option<Texture>,
     /// Further maps, of which no more is known.

@@ -299,6 +299,8 @@ struct Stated<'m> {
     name: &'m str,
     #[serde(skip_serializing_if = "Option::is_none")]
     alpha_mode: Option<&'static str>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    alpha_cutoff: Option<f32>,
     pbr_metallic_roughness: StatedPbr,
     #[serde(skip_serializing_if = "Option::is_none")]
     emissive_factor: Option<[f32; 3]>,
@@ -338,13 +340,16 @@ impl<'m> Stated<'m> {
         let unit = |number: f32| if number.is_nan() { 0.0 } else { number.clamp(0.0, 1.0) };
         let [red, green, blue] = material.diffuse.unwrap_or([1.0; 3]).map(unit);
         let alpha = if material.transparent { unit(material.opacity.unwrap_or(1.0)) } else { 1.0 };
+        let cutoff = material.alpha_cutoff.filter(|_| !material.transparent && texture.is_some());
+        let cutoff = cutoff.map(|cutoff| cutoff.max(0.0));
         // Light beyond 1 is a factor of its own.
         let emissive = material.emissive.map(|colour| colour.map(|c| c.clamp(0.0, f32::MAX)));
         let strongest = emissive.map_or(0.0, |colour| colour.into_iter().fold(0.0, f32::max));
         let strength = (strongest > 1.0).then_some(strongest);
         Self {
             name: &material.name,
-            alpha_mode: material.transparent.then_some("BLEND"),
+            alpha_mode: if material.transparent { Some("BLEND") } else { cutoff.map(|_| "MASK") },
+            alpha_cutoff: cutoff,
             pbr_metallic_roughness: StatedPbr {
                 base_color_factor: [red, green, blue, alpha],
                 base_color_texture: texture.map(|index| StatedTexture { index }),

@@ -16,6 +16,9 @@ const HAS_EMISSIVE: u32 = 4;
 const HAS_METALLIC: u32 = 8;
 const HAS_ROUGHNESS: u32 = 16;
 const BLENDS: u32 = 32;
+const HAS_CUTOFF: u32 = 64;
+/// Where images are cut off, if it is not stated.
+const CUTOFF: f32 = 0.5;
 /// Where the set of further maps begins among the flags.
 const MAPS_SHIFT: u32 = 8;
 
@@ -27,16 +30,19 @@ pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
     let pbr = &material.pbr_metallic_roughness;
     let extensions = &material.extensions;
     let blends = material.alpha_mode.as_deref() == Some("BLEND");
+    let cuts = material.alpha_mode.as_deref() == Some("MASK");
     let transmits = extensions.transmission.as_ref().is_some_and(|t| t.transmission_factor > 0.0);
     let strength = extensions.emissive_strength.as_ref().and_then(|e| e.emissive_strength);
     let flags = [
         (blends || transmits, TRANSPARENT),
         (blends, BLENDS),
         (pbr.base_color_factor.is_some(), HAS_BASE),
-        (material.emissive_factor.is_some(), HAS_EMISSIVE),
-        // What is not stated is one, which other formats do not know.
-        (true, HAS_METALLIC),
-        (true, HAS_ROUGHNESS),
+        (material.emissive_factor.is_some() && material.emissive_texture.is_none(), HAS_EMISSIVE),
+        (cuts, HAS_CUTOFF),
+        // What is not stated is one, which other formats do not know. Factors of a map mean nothing
+        // without it.
+        (pbr.metallic_roughness_texture.is_none(), HAS_METALLIC),
+        (pbr.metallic_roughness_texture.is_none(), HAS_ROUGHNESS),
     ];
     let maps = [
         (material.normal_texture.is_some(), OtherMaps::NORMAL),
@@ -58,6 +64,7 @@ pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
         emissive: emissive.map(|channel| channel * strength.unwrap_or(1.0)),
         metallic: pbr.metallic_factor.unwrap_or(1.0),
         roughness: pbr.roughness_factor.unwrap_or(1.0),
+        alpha_cutoff: material.alpha_cutoff.unwrap_or(CUTOFF),
         texture: pbr.base_color_texture.as_ref().map_or(NONE, |texture| texture.index),
         ..MaterialRecord::zeroed()
     }
@@ -81,6 +88,7 @@ pub(crate) fn material(model: &mut Model, number: u32) -> Result<Material, IoErr
         emissive: has(HAS_EMISSIVE).then_some(record.emissive).filter(is_finite),
         metallic: has(HAS_METALLIC).then_some(record.metallic).filter(|x| x.is_finite()),
         roughness: has(HAS_ROUGHNESS).then_some(record.roughness).filter(|x| x.is_finite()),
+        alpha_cutoff: has(HAS_CUTOFF).then_some(record.alpha_cutoff).filter(|x| x.is_finite()),
         texture: image_of(model, record.texture)?,
         other_maps: OtherMaps::from_bits((record.flags >> MAPS_SHIFT) as u8),
     })

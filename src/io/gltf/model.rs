@@ -135,6 +135,7 @@ pub(crate) struct MaterialRecord {
     pub(crate) emissive: [f32; 3],
     pub(crate) metallic: f32,
     pub(crate) roughness: f32,
+    pub(crate) alpha_cutoff: f32,
     pub(crate) texture: u32,
     /// Which texture coordinates it takes, and the map that they go through: rows of three.
     pub(crate) uv_set: u32,

@@ -163,6 +163,7 @@ pub(crate) struct Scene {
 pub(crate) struct Material {
     pub(crate) name: Option<String>,
     pub(crate) alpha_mode: Option<String>,
+    pub(crate) alpha_cutoff: Option<f32>,
     pub(crate) emissive_factor: Option<[f32; 3]>,
     #[serde(default)]
     pub(crate) pbr_metallic_roughness: Pbr,

@@ -265,6 +265,7 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         emissive: Some([2.0, 0.0, 0.0]),
         metallic: Some(1.0),
         roughness: Some(0.75),
+        alpha_cutoff: None,
         texture: Some(Texture::Beside("a b.png".to_owned())),
         other_maps: OtherMaps::default(),
     };
@@ -276,6 +277,21 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         ..Material::default()
     };
     assert_eq!(content.materials, [blend, Material::default(), glass]);
+}
+
+#[test]
+fn factors_of_maps_mean_nothing_without_them_and_images_are_cut_off() {
+    let content = changed(|json, _| {
+        json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        let pbr = json!({"metallicFactor": 0.5, "metallicRoughnessTexture": {"index": 0}});
+        json["materials"] = json!([{"pbrMetallicRoughness": pbr, "alphaMode": "MASK",
+            "emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0}}]);
+        json["textures"] = json!([{"source": 0}]);
+        json["images"] = json!([{"uri": "a.png"}]);
+    });
+    let material = &content.materials[0];
+    assert_eq!((material.metallic, material.roughness, material.emissive), (None, None, None));
+    assert_eq!((material.alpha_cutoff, material.transparent), (Some(0.5), false));
 }
 
 #[test]

@@ -21,6 +21,7 @@ fn materials() -> Vec<Material> {
             emissive: Some([4.0, 0.0, 2.0]),
             metallic: Some(0.75),
             roughness: Some(0.1),
+            alpha_cutoff: None,
             texture: Some(Texture::Beside("a.png".to_owned())),
             other_maps: OtherMaps::default(),
         },

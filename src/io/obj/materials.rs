@@ -156,6 +156,7 @@ impl Library {
                 emissive: stated("Ke").and_then(colour).filter(is_finite),
                 metallic: number("Pm"),
                 roughness: number("Pr"),
+                alpha_cutoff: None,
                 texture: material.diffuse_texture.map(|name| self.texture(path, name)),
                 other_maps: maps,
                 name: material.name,
