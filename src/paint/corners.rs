@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::mesh::{CornerForm, MeshSink, VertexValues};
 use crate::paint::drawing::{Drawn, DrawnCorner};
-use crate::paint::fans::{Fans, mean_normal};
+use crate::paint::fans::Fans;
 use crate::paint::values::{Value, Values};
 use crate::paint::{BATCH, PaintError, PaintOptions, stop_if_asked};
 use crate::store::{Record, Resources, Sorted, Sorter, SpoolPeek, StoreError};
@@ -161,8 +161,7 @@ impl<'p, S: MeshSink + ?Sized> Painter<'p, S> {
                         (answers[parts[at]].normal, answers[parts[at]].normal_number);
                     continue;
                 }
-                let of_part = around.iter().zip(&parts).filter(|(_, part)| **part == at);
-                answers[at].normal = mean_normal(of_part.map(|(corner, _)| corner));
+                answers[at].normal = self.fans.normal(around, at);
                 if !is_split {
                     answers[at].normal_number = number(&mut self.normals, "Normals")?;
                     self.batch.normals.push(answers[at].normal);
