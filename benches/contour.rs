@@ -18,6 +18,7 @@ const LEAVES: ContourOptions = ContourOptions {
     crease_deg: 12.0,
     decimate_cells: 0.0,
     surfaces: SurfaceDetail::None,
+    sources: false,
 };
 const CLUSTERS: ContourOptions = ContourOptions { decimate_cells: 0.1, ..LEAVES };
 

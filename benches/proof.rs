@@ -7,7 +7,7 @@ use std::hint::black_box;
 use brickmend::mesh::{Discarded, MeshSource, TriangleBatch};
 use brickmend::monitor::Void;
 use brickmend::store::Scratch;
-use brickmend::verify::{Outward, ProofOptions, ProvedSource, prove};
+use brickmend::verify::{Outward, ProofOptions, ProvedSource, Vertices, prove};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 
 const RINGS: u32 = 500;
@@ -96,7 +96,12 @@ fn proofs(criterion: &mut Criterion) {
         let sphere = Sphere::new(indexed);
         let triangles = sphere.batches.iter().map(TriangleBatch::len).sum::<usize>();
         group.throughput(Throughput::Elements(triangles as u64));
-        let options = ProofOptions { share_bytes, outward: Outward::AllPositive, intersections };
+        let options = ProofOptions {
+            share_bytes,
+            outward: Outward::AllPositive,
+            vertices: Vertices::Numbers,
+            intersections,
+        };
         group.bench_function(name, |bencher| {
             bencher.iter(|| {
                 let show = || Box::new(Show { sphere: &sphere, next: 0 });

@@ -151,6 +151,35 @@ fn closed_soups_are_told_to_be_closed_and_bounded_by_their_hits() {
 }
 
 #[test]
+fn what_a_surface_gets_besides_its_shape_is_counted() {
+    let workshop = Workshop::new();
+    let mut text = String::from("vn 0 0 1\n");
+    for (number, [x, y, z]) in sphere([0.0; 3], 1.0, 24).iter().flatten().enumerate() {
+        let u = y.atan2(*x);
+        writeln!(text, "v {x} {y} {z} 0.5 0 0.25\nvt {u} {z}").expect("strings grow");
+        if number % 3 == 2 {
+            let [a, b, c] = [number - 1, number, number + 1];
+            writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}").expect("strings grow");
+        }
+    }
+    let input = workshop.write_text("obj", &text);
+    for settings in [at_depth(6), unclustered(6)] {
+        for name in ["out.obj", "out.ply", "out.3mf", "out.glb"] {
+            let format = format_of_extension(Path::new(name)).expect("a known ending");
+            for share_bytes in [None, Some(64 << 10)] {
+                let limits = Limits { share_bytes, ..limits(BUDGETS[1]) };
+                let told = estimate(&input, format, &settings, &limits, &Void).expect("told");
+                let (outcome, disk) = measured(&input, name, &settings, &limits);
+                assert!(outcome.transfer.attributes.uvs && told.input.attributes.normals);
+                let bytes = outcome.output.bytes;
+                assert!(bytes <= told.output_bytes, "{name}: {bytes} of {}", told.output_bytes);
+                assert!(disk <= told.disk_bytes, "{name}: {disk} of {:?}", told.disk);
+            }
+        }
+    }
+}
+
+#[test]
 fn an_estimate_takes_the_depth_of_the_repair() {
     let input = testdata("models/cube.off");
     let tolerance = |length, max_depth| Settings {

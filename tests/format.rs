@@ -4,12 +4,13 @@ use std::mem::offset_of;
 use std::path::Path;
 
 use brickmend::geom::morton;
-use brickmend::ingest::AttributeRecord;
 use brickmend::octree::{
-    AXIS_EDGES, BinEntry, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick, FlipRecord,
-    HitBrick, HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle, SourcePlane,
-    TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index, encode,
+    AXIS_EDGES, AttributeRecord, BinEntry, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick,
+    FlipRecord, HitBrick, HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle,
+    SourcePlane, TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index,
+    encode,
 };
+use brickmend::paint::{AskedPlace, DrawnCorner, DrawnTriangle};
 use brickmend::scan::HAS_ODD_FACES;
 use brickmend::store::{
     Backing, BrickFile, BrickWriter, DirectoryEntry, FORMAT_VERSION, Manifest, Scratch,
@@ -89,9 +90,37 @@ fn records_of_spools_are_as_documented() {
     check_record::<AttributeRecord>(
         "AttributeRecord",
         &[
+            offset_of!(AttributeRecord, corners),
             offset_of!(AttributeRecord, uvs),
             offset_of!(AttributeRecord, colours),
-            offset_of!(AttributeRecord, polygon),
+            offset_of!(AttributeRecord, unused),
+        ],
+    );
+    check_record::<DrawnTriangle>(
+        "DrawnTriangle",
+        &[offset_of!(DrawnTriangle, indices), offset_of!(DrawnTriangle, surface)],
+    );
+    check_record::<DrawnCorner>(
+        "DrawnCorner",
+        &[
+            offset_of!(DrawnCorner, vertex),
+            offset_of!(DrawnCorner, triangle),
+            offset_of!(DrawnCorner, corner),
+            offset_of!(DrawnCorner, look),
+            offset_of!(DrawnCorner, others),
+            offset_of!(DrawnCorner, normal),
+            offset_of!(DrawnCorner, angle),
+            offset_of!(DrawnCorner, height),
+        ],
+    );
+    check_record::<AskedPlace>(
+        "AskedPlace",
+        &[
+            offset_of!(AskedPlace, position),
+            offset_of!(AskedPlace, vertex),
+            offset_of!(AskedPlace, look),
+            offset_of!(AskedPlace, source),
+            offset_of!(AskedPlace, unused),
         ],
     );
     check_record::<BinEntry>(

@@ -218,6 +218,22 @@ fn the_library_beside_an_obj_holds_the_materials_and_replaces_none_of_another() 
 }
 
 #[test]
+fn images_that_are_missing_and_further_maps_are_told() {
+    let workshop = Workshop::new();
+    let library = "newmtl oak\nmap_Kd ../secret.png\nmap_Bump b.png\n";
+    let library = workshop.write_text("mtl", library);
+    let soup = cuboid([0.0; 3], [1.0; 3]);
+    let input = workshop.write_text("obj", &text_of(&library, &[("oak", &soup)]));
+    for extension in EXTENSIONS {
+        let settings = at_depth(5);
+        let repaired = workshop.repair(&input, extension, &settings, &Limits::default());
+        let lost = repaired.expect("a result").outcome.transfer.lost;
+        assert!(lost.contains(&"the texture ../secret.png".to_owned()), "{extension}: {lost:?}");
+        assert!(lost.contains(&"normal maps".to_owned()), "{extension}: {lost:?}");
+    }
+}
+
+#[test]
 fn limits_change_no_byte_of_painted_files() {
     let workshop = Workshop::new();
     let library = workshop.write_text("mtl", LIBRARY);

@@ -10,7 +10,7 @@ use support::schema::check_document;
 use support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 48] = [
+const CONDITIONAL: [&str; 49] = [
     "hidden.largest[]",
     "hidden.largest[].part",
     "hidden.largest[].part_number",
@@ -59,6 +59,7 @@ const CONDITIONAL: [&str; 48] = [
     "output.proof.places[].corners",
     "output.proof.places[].triangles",
     "output.proof.places[].fans",
+    "output.proof.places[].meeting",
 ];
 
 #[test]

@@ -2,7 +2,8 @@
 
 mod support;
 
-use std::path::Path;
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
 
 use brickmend::contour::Method;
 use brickmend::mesh::shapes::{Random, sphere};
@@ -15,15 +16,15 @@ use crate::support::run::{Encoding, Workshop, at_depth};
 
 /// So little that every long step notes its progress many times.
 const CHECKPOINT_BYTES: u64 = 64 << 10;
-const STEPS: [&str; 14] = [
+const STEPS: [&str; 15] = [
     "read", "bin", "settle", "mend", "scan", "patch", "flood", "revise", "sign", "choose", "place",
-    "separate", "write", "prove",
+    "separate", "draw", "write", "prove",
 ];
 
 /// A broken model, what comes of it, and images of the work on the way.
 struct Filmed {
     workshop: Workshop,
-    input: std::path::PathBuf,
+    input: PathBuf,
     settings: Settings,
     limits: Limits,
     expected: Vec<u8>,
@@ -41,6 +42,10 @@ fn film_with(settings: Settings, stride: u64) -> Filmed {
     Breakage::Duplicate.apply(&mut soup, 0.1, &mut random);
     let workshop = Workshop::new();
     let input = workshop.write(&soup, Encoding::Obj);
+    film_file(workshop, input, settings, stride)
+}
+
+fn film_file(workshop: Workshop, input: PathBuf, settings: Settings, stride: u64) -> Filmed {
     let limits = Limits { checkpoint_bytes: CHECKPOINT_BYTES, ..Limits::default() };
     let place = Place::new();
     let photographer = Photographer::new(&place, stride);
@@ -95,6 +100,34 @@ fn a_kill_between_checkpoints_goes_on_from_the_last_one() {
 }
 
 #[test]
+fn textured_surfaces_go_on_from_any_moment() {
+    let mut text = String::new();
+    for (number, [x, y, z]) in sphere([0.0; 3], 1.0, 20)[7..].iter().flatten().enumerate() {
+        let u = y.atan2(*x);
+        writeln!(text, "v {x} {y} {z} {} 0 0.5\nvt {u} {z}", 0.5 + 0.4 * x).expect("strings grow");
+        if number % 3 == 2 {
+            let [a, b, c] = [number - 1, number, number + 1];
+            writeln!(text, "f {a}/{a} {b}/{b} {c}/{c}").expect("strings grow");
+        }
+    }
+    let workshop = Workshop::new();
+    let input = workshop.write_text("obj", &text);
+    let filmed = film_file(workshop, input, at_depth(6), 9);
+    for step in ["draw", "write", "prove"] {
+        assert!(filmed.images.iter().any(|(moment, _)| moment.step == step), "{step}");
+    }
+    let late = filmed.images.iter().rposition(|(moment, _)| moment.step == "separate");
+    let late = late.expect("a step before");
+    let early = filmed.images[..late].iter().step_by(5);
+    for (moment, image) in early.chain(&filmed.images[late..]) {
+        let limits = Limits { threads: 3, ..filmed.limits.clone() };
+        let (outcome, bytes) = image.resume(&filmed.input, &filmed.settings, &limits);
+        assert!(bytes == filmed.expected, "{moment:?}: other bytes");
+        assert!(outcome.transfer.attributes.uvs && outcome.transfer.attributes.colours);
+    }
+}
+
+#[test]
 fn marching_cubes_go_on_from_any_checkpoint() {
     let filmed = film_with(Settings { method: Method::Mc, ..at_depth(7) }, u64::MAX);
     for step in ["place", "write"] {
@@ -113,7 +146,7 @@ fn marching_cubes_go_on_from_any_checkpoint() {
 }
 
 /// Files of an image that a later run reads.
-fn files_of(image: &Place) -> Vec<std::path::PathBuf> {
+fn files_of(image: &Place) -> Vec<PathBuf> {
     let entries = std::fs::read_dir(image.work_folder()).expect("readable");
     let mut files: Vec<_> = entries.map(|entry| entry.expect("readable").path()).collect();
     files.retain(|file| {

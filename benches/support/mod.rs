@@ -9,7 +9,7 @@ use brickmend::ingest::{Bins, Settled, fill_bins, read_soup, settle};
 use brickmend::mesh::shapes::{
     Corners, ListedTriangles, Random, gear, rotation, sphere, transform,
 };
-use brickmend::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
+use brickmend::mesh::{Attributes, MeshSink, SinkState, SinkStats, SinkTriangles};
 use brickmend::monitor::Void;
 use brickmend::octree::{Domain, Flips};
 use brickmend::patch::patch;
@@ -77,7 +77,8 @@ impl Workshop {
     pub fn ingest(&self, triangles: &[Corners], depth: u32) -> Ingested {
         let resources = self.resources();
         let mut source = ListedTriangles::without_indices(triangles.to_vec());
-        let soup = read_soup(&mut source, false, &resources).expect("ingest works");
+        let soup =
+            read_soup(&mut source, false, Attributes::NONE, &resources).expect("ingest works");
         let domain = Domain::around(&soup.facts.bounds, depth, false).expect("room enough");
         let (bins, _) = fill_bins(&soup, &domain, &resources).expect("ingest works");
         let settled =

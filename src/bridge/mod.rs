@@ -50,12 +50,15 @@ use crate::octree::{
 use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError};
 
 pub use loops::MOST_RIMS;
-pub use thicken::{THICKENED, ThickenStats, Thickened, thicken};
+pub use thicken::{SLAB_ORIGINS, THICKENED, ThickenStats, Thickened, thicken};
 
 /// Spools of the triangles that were added, of their bins, and of all triangles that do not count.
 pub const ADDED: &str = "added.spool";
 /// See [`ADDED`].
 pub const ADDED_ENTRIES: &str = "added.entries";
+/// Spool of the triangles whose texture coordinates and colours added ones have, one after the
+/// other; empty where nobody asks.
+pub const ORIGINS: &str = "added.origins";
 /// See [`ADDED`].
 pub const LEFT_OUT: &str = "leftout.spool";
 
@@ -91,6 +94,8 @@ pub struct MendOptions {
     pub crease_deg: f64,
     /// Box of the soup: walls reach beyond it by half their thickness at most.
     pub bounds: SnapBox,
+    /// Whether it is kept which triangle an added one comes from.
+    pub keeps_origins: bool,
 }
 
 /// Counts of mending. Lengths and areas in model units.
@@ -149,6 +154,8 @@ pub struct Mended {
     pub triangles: Spool<SoupTriangle>,
     /// Their bins.
     pub entries: Spool<BinEntry>,
+    /// See [`ORIGINS`].
+    pub origins: Spool<u32>,
 }
 
 impl Mended {
@@ -162,6 +169,7 @@ impl Mended {
             left_out: Spool::open(scratch, FileState::find(files, LEFT_OUT)?)?,
             triangles: Spool::open(scratch, FileState::find(files, ADDED)?)?,
             entries: Spool::open(scratch, FileState::find(files, ADDED_ENTRIES)?)?,
+            origins: Spool::open(scratch, FileState::find(files, ORIGINS)?)?,
         })
     }
 
@@ -172,6 +180,7 @@ impl Mended {
             self.left_out.state().clone(),
             self.triangles.state().clone(),
             self.entries.state().clone(),
+            self.origins.state().clone(),
         ]
     }
 
@@ -209,7 +218,7 @@ pub fn mend(
     let options = &MendOptions { max_gap: options.max_gap.max(least_gap), ..*options };
     let Known { triangles, rim_edges, has_panes } = known;
     let mut stats = MendStats::default();
-    let mut added = Added::new(domain, triangles, resources);
+    let mut added = Added::new(domain, triangles, options, ORIGINS, resources)?;
     let mut drops = Sorter::<DropRecord>::new(resources.scratch, resources.share_bytes / 4);
     if triangles > sheets::MOST_TRIANGLES {
         stats.crowded_rims = rim_edges;
@@ -228,10 +237,11 @@ pub fn mend(
     }
     let left_out = left_out.finish()?;
     let (triangles, entries) = write_bins(added.bins, [ADDED, ADDED_ENTRIES], resources)?;
+    let origins = added.origins.finish()?;
     for name in PASSING {
         resources.scratch.remove(name)?;
     }
-    Ok((Mended { left_out, triangles, entries }, stats))
+    Ok((Mended { left_out, triangles, entries, origins }, stats))
 }
 
 fn mend_open(
@@ -266,8 +276,10 @@ fn mend_open(
 struct Like {
     part: u32,
     material: u32,
-    /// Source number of a triangle that it stands for or closes.
+    /// Source number of a triangle whose body it belongs to.
     of: u32,
+    /// Source number of the triangle whose material it has.
+    from: u32,
 }
 
 /// Triangles that are added, on their way into bins.
@@ -277,12 +289,22 @@ struct Added<'a> {
     /// Source number of the first one.
     first: u64,
     next: u64,
+    origins: SpoolWriter<u32>,
+    keeps_origins: bool,
 }
 
 impl<'a> Added<'a> {
-    fn new(domain: &'a Domain, first: u64, resources: &Resources) -> Self {
+    fn new(
+        domain: &'a Domain,
+        first: u64,
+        options: &MendOptions,
+        origins: &str,
+        resources: &Resources,
+    ) -> Result<Self, StoreError> {
         let bins = Sorter::new(resources.scratch, resources.share_bytes / 4);
-        Self { domain, bins, first, next: first }
+        let origins = SpoolWriter::create(resources.scratch, origins)?;
+        let keeps_origins = options.keeps_origins;
+        Ok(Self { domain, bins, first, next: first, origins, keeps_origins })
     }
 
     /// Adds a triangle like this one.
@@ -291,9 +313,12 @@ impl<'a> Added<'a> {
         if self.next > limit {
             return Err(StoreError::TooMany { what: "Triangles", limit });
         }
-        let Like { part, material, of } = like;
+        let Like { part, material, of, from } = like;
         let (source, stands_for) = (self.next as u32, of + 1);
         self.next += 1;
+        if self.keeps_origins {
+            self.origins.push(from)?;
+        }
         let triangle = SoupTriangle { corners, source, part, material, stands_for };
         let snapped = corners.map(|corner| self.domain.snap(corner));
         for_each_touched_brick(self.domain, snapped, &mut |key| {

@@ -57,7 +57,8 @@ impl RimEdge {
 
     /// What a triangle that closes the rim has from the one along it.
     pub fn like(&self) -> Like {
-        Like { part: self.part, material: self.material | CLOSES, of: self.source }
+        let (material, of) = (self.material | CLOSES, self.source);
+        Like { part: self.part, material, of, from: of }
     }
 
     /// Whether light passes its triangle.

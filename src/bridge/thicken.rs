@@ -30,6 +30,10 @@ use crate::store::{Resources, Sorted, Sorter, Spool, StoreError, Table};
 /// Spools of the triangles that are added in the end, and of their bins; they live within a step.
 pub const THICKENED: [&str; 2] = ["thickened.spool", "thickened.entries"];
 
+/// Spool of the triangles that slabs come from, as [`crate::bridge::ORIGINS`] for what was added
+/// before.
+pub const SLAB_ORIGINS: &str = "slabs.origins";
+
 /// Share of its hits that a wall loses when it is thin: of a plate that is t cells thick 1 - t.
 const LOST_SHARE: f64 = 0.15;
 
@@ -61,6 +65,8 @@ pub struct ThickenStats {
 pub struct Thickened {
     triangles: Spool<SoupTriangle>,
     entries: Spool<BinEntry>,
+    /// See [`SLAB_ORIGINS`].
+    pub origins: Spool<u32>,
 }
 
 impl Thickened {
@@ -118,7 +124,7 @@ pub fn thicken(
     let pairs = SoupEdges::find(soup, domain, Panes::Apart, resources)?.pairs;
     let mut sheets = Sheets::join(pairs, first, resources)?;
     let mut losses = Losses::new(lost, first, resources)?;
-    let mut added = Added::new(domain, first, resources);
+    let mut added = Added::new(domain, first, options, SLAB_ORIGINS, resources)?;
     let mut stats = ThickenStats::default();
     // Walls and fills are as thick as they should be.
     let is_judged = |triangle: &SoupTriangle, brick: u64| {
@@ -163,7 +169,8 @@ pub fn thicken(
     stats.added_triangles = added.next - first;
     add_all(soup, &mut added.bins)?;
     let (triangles, entries) = write_bins(added.bins, THICKENED, resources)?;
-    Ok(Some((Thickened { triangles, entries }, stats)))
+    let origins = added.origins.finish()?;
+    Ok(Some((Thickened { triangles, entries, origins }, stats)))
 }
 
 /// How many edges of the grid a triangle hits on average.
@@ -183,7 +190,8 @@ fn surround(
     let normal = (q - p).cross(r - p).normalize_or_zero();
     let half = 0.5 * options.thickness;
     let slab = Slab::new(triangle, [normal; 3], [-half, half], &options.bounds.grown(half));
-    let like = Like { part: triangle.part, material: triangle.material, of: triangle.source };
+    let SoupTriangle { part, material, source, .. } = *triangle;
+    let like = Like { part, material, of: source, from: source };
     slab.push([true; 3], false, added, like)
 }
 

@@ -185,7 +185,8 @@ impl Builder {
         let is_turned = wall.flags & IS_TURNED != 0;
         let by = [low, high].map(|by| by * self.thickness);
         let slab = Slab::new(triangle, miters, by, &self.room);
-        let like = Like { part: triangle.part, material: triangle.material, of: wall.member };
+        let SoupTriangle { part, material, source, .. } = *triangle;
+        let like = Like { part, material, of: wall.member, from: source };
         slab.push(has_end, is_turned, added, like)
     }
 }

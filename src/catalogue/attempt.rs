@@ -48,7 +48,8 @@ impl Place {
     /// # Errors
     /// [`CatalogueError::BudgetBelowFloor`].
     pub fn new(options: &BatchOptions, own: &Path) -> Result<Self, CatalogueError> {
-        let (jobs, whole) = (options.jobs.max(1), options.max_memory_bytes.saturating_sub(OWN_BYTES));
+        let (jobs, whole) =
+            (options.jobs.max(1), options.max_memory_bytes.saturating_sub(OWN_BYTES));
         let share = whole / jobs as u64;
         if share < floor_bytes(1) {
             return Err(CatalogueError::BudgetBelowFloor {

@@ -9,7 +9,7 @@ use crate::io::{Format, ReadOptions, format_of_name};
 use crate::monitor::Monitor;
 use crate::repair::{Blame, Limits, MemoryPlan, RepairError};
 use crate::store::{Scratch, StoreError, sync_folder};
-use crate::verify::{Outward, ProofOptions, VerifyError, prove};
+use crate::verify::{Outward, ProofOptions, VerifyError, Vertices, prove};
 
 /// Copies `input` to `output`, whole or not at all, if it is sound and of the format that is asked
 /// for; whether it was.
@@ -28,7 +28,8 @@ pub fn copy_if_sound(
     monitor: &dyn Monitor,
 ) -> Result<bool, RepairError> {
     let is_packed = crate::io::unpacked_name(input) != input;
-    if is_packed || format_of_name(input) != Some(format) || format_of_name(output) != Some(format) {
+    if is_packed || format_of_name(input) != Some(format) || format_of_name(output) != Some(format)
+    {
         return Ok(false);
     }
     if !is_sound(input, limits, monitor)? {
@@ -46,8 +47,12 @@ fn is_sound(input: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<bool
     let folder = limits.work_dir.as_deref().unwrap_or(Path::new("."));
     let scratch = Scratch::new(folder);
     let share_bytes = plan.share_bytes;
-    let options =
-        ProofOptions { share_bytes, outward: Outward::AlternatesWithNesting, intersections: true };
+    let options = ProofOptions {
+        share_bytes,
+        outward: Outward::AlternatesWithNesting,
+        vertices: Vertices::Positions,
+        intersections: true,
+    };
     let mut open = || {
         let source = crate::io::open(input, &scratch, &ReadOptions { share_bytes })?;
         Ok(source as Box<dyn crate::mesh::MeshSource<Error = _> + Send>)

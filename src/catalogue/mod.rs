@@ -66,10 +66,7 @@ pub struct BatchReport {
 ///
 /// # Errors
 /// [`CatalogueError`]. Results that are in place stay, and the journal knows of them.
-pub fn run_batch(
-    options: &BatchOptions,
-    fleet: &dyn Fleet,
-) -> Result<BatchReport, CatalogueError> {
+pub fn run_batch(options: &BatchOptions, fleet: &dyn Fleet) -> Result<BatchReport, CatalogueError> {
     keep_apart(options)?;
     let own = options.target.join(FOLDER);
     let place = Place::new(options, &own)?;

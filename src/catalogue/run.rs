@@ -181,7 +181,11 @@ impl<'b> Workload<'b> {
             return None;
         };
         let slot = self.free_slots.pop()?;
-        if rung == Rung::Shared { self.pending.pop_front() } else { self.alone.pop_front().map(|_| 0) };
+        if rung == Rung::Shared {
+            self.pending.pop_front()
+        } else {
+            self.alone.pop_front().map(|_| 0)
+        };
         match self.begin(slot, id, rung) {
             Ok(begun) => {
                 self.is_alone = rung != Rung::Shared;
@@ -345,10 +349,8 @@ impl<'b> Workload<'b> {
         let pace = if is_known { self.actual_seconds / self.predicted_seconds } else { 1.0 };
         let left_seconds = self.left_seconds * pace / self.options.jobs.max(1) as f64;
         let model = &attempt.row.relative.to_string_lossy();
-        self.fleet.ended(
-            attempt.slot,
-            &Ended { model, state, cause, reason, seconds, left_seconds },
-        );
+        self.fleet
+            .ended(attempt.slot, &Ended { model, state, cause, reason, seconds, left_seconds });
     }
 
     /// A file as the journal has it: within the folder of the results.

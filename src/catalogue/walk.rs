@@ -162,8 +162,11 @@ pub fn walk(
         !entry.file_type().is_dir()
             || !entry.path().canonicalize().is_ok_and(|folder| hidden.contains(&folder))
     };
-    let entries =
-        WalkDir::new(source).follow_links(true).sort_by_file_name().into_iter().filter_entry(is_shown);
+    let entries = WalkDir::new(source)
+        .follow_links(true)
+        .sort_by_file_name()
+        .into_iter()
+        .filter_entry(is_shown);
     for entry in entries {
         let entry = match entry {
             Ok(entry) => entry,
@@ -279,7 +282,8 @@ mod tests {
         symlink("nowhere", source.join("dead.stl")).expect("a link");
         let hidden = [source.join("out").canonicalize().expect("there")];
         let (models, passed) = found(source, &hidden, &Selection::default());
-        let expected = [Path::new("a b/é.Obj"), Path::new(odd), "c.ply.gz".as_ref(), "plain".as_ref()];
+        let expected =
+            [Path::new("a b/é.Obj"), Path::new(odd), "c.ply.gz".as_ref(), "plain".as_ref()];
         assert_eq!(models, expected);
         assert_eq!(passed.counts[&Passed::NoModel], 3);
         assert_eq!(passed.counts[&Passed::Loop], 1);
@@ -294,13 +298,17 @@ mod tests {
             write(&source.join(name), b"x");
         }
         let select = |include: &[&str], exclude: &[&str], sizes| {
-            let texts = |patterns: &[&str]| patterns.iter().map(|&p| p.to_owned()).collect::<Vec<_>>();
+            let texts =
+                |patterns: &[&str]| patterns.iter().map(|&p| p.to_owned()).collect::<Vec<_>>();
             Selection::new(&texts(include), &texts(exclude), sizes).expect("good patterns")
         };
         let names = |selection| found(source, &[], &selection).0;
         assert_eq!(names(select(&["*.stl"], &[], None)), [Path::new("b/TABLE.STL")]);
         assert_eq!(names(select(&["a/*"], &[], None)), [Path::new("a/chair.obj")]);
-        assert_eq!(names(select(&["a/**"], &["old/**", "**/old/**"], None)), [Path::new("a/chair.obj")]);
+        assert_eq!(
+            names(select(&["a/**"], &["old/**", "**/old/**"], None)),
+            [Path::new("a/chair.obj")]
+        );
         assert_eq!(names(select(&[], &[], Some((2, 9)))), Vec::<PathBuf>::new());
         let broken = Selection::new(&["a[".to_owned()], &[], None);
         assert!(matches!(broken, Err(CatalogueError::Pattern { .. })));

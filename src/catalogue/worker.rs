@@ -12,7 +12,7 @@ use crate::catalogue::job::{Ending, Job, Made, OutputFile, RawPath, Task};
 use crate::catalogue::stamp::{Stamp, Stamped};
 use crate::io::{Format, library_name};
 use crate::monitor::Monitor;
-use crate::repair::{Blame, Limits, Outcome, RepairError, estimate, repair};
+use crate::repair::{Limits, Outcome, RepairError, estimate, repair};
 
 /// Does what `job` asks for. The caller fills in what the kernel knows of the process.
 #[must_use]
@@ -50,7 +50,9 @@ fn predict(job: &Job, input: &Path, monitor: &dyn Monitor) -> Result<Made, Repai
 fn make(job: &Job, input: &Path, monitor: &dyn Monitor) -> Result<Made, RepairError> {
     let (output, limits) = (job.output.to_path(), limits_of(job));
     let before = Stamp::at(input);
-    if job.task == Task::RepairBroken && copy_if_sound(input, &output, job.format, &limits, monitor)? {
+    if job.task == Task::RepairBroken
+        && copy_if_sound(input, &output, job.format, &limits, monitor)?
+    {
         if Stamp::at(input) != before {
             return Err(RepairError::InputChanged { path: input.to_path_buf() });
         }

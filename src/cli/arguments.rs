@@ -4,8 +4,11 @@ use std::path::PathBuf;
 
 use brickmend::contour::Method;
 use brickmend::ingest::SheetRule;
+use brickmend::io::Format;
 use brickmend::mesh::LengthUnit;
-use brickmend::repair::{Depth, HiddenRule, Length, Limits, MaxHole, Reach, Settings, ThinRule};
+use brickmend::repair::{
+    Depth, HiddenRule, Length, Limits, MaxHole, NormalRule, Reach, Settings, ThinRule,
+};
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
 
@@ -66,6 +69,10 @@ pub struct ResultArguments {
     /// in, and 3MF outputs say it. No number is changed.
     #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
     units: Option<LengthUnit>,
+    /// Which normals the output gets, in OBJ and GLB: smooth, but for creases (--crease), if the
+    /// input has some (keep) or always (smooth).
+    #[arg(long, value_enum, default_value_t = NormalRuleName::Keep)]
+    normals: NormalRuleName,
     /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ,
     /// PLY, 3MF and GLB.
     #[arg(long)]
@@ -130,6 +137,16 @@ enum HiddenRuleName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum NormalRuleName {
+    /// Normals where the input has some.
+    Keep,
+    /// Normals.
+    Smooth,
+    /// None.
+    None,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum MethodName {
     /// Manifold dual contouring: creases and corners stay sharp.
     Mdc,
@@ -148,6 +165,31 @@ impl From<MethodName> for Method {
             MethodName::Dc => Self::Dc,
             MethodName::Dmc => Self::Dmc,
             MethodName::Mc => Self::Mc,
+        }
+    }
+}
+
+/// A format that is written, by its name.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum FormatName {
+    Obj,
+    Stl,
+    Ply,
+    Off,
+    #[value(name = "3mf")]
+    ThreeMf,
+    Glb,
+}
+
+impl From<FormatName> for Format {
+    fn from(name: FormatName) -> Self {
+        match name {
+            FormatName::Obj => Self::Obj,
+            FormatName::Stl => Self::Stl,
+            FormatName::Ply => Self::Ply,
+            FormatName::Off => Self::Off,
+            FormatName::ThreeMf => Self::ThreeMf,
+            FormatName::Glb => Self::Glb,
         }
     }
 }
@@ -184,6 +226,11 @@ impl ResultArguments {
         let (crease_deg, strict) = (self.crease, self.strict);
         let (decimate, max_triangles) = (self.decimate, self.max_triangles);
         let method = self.method.into();
+        let normals = match self.normals {
+            NormalRuleName::Keep => NormalRule::Keep,
+            NormalRuleName::Smooth => NormalRule::Smooth,
+            NormalRuleName::None => NormalRule::None,
+        };
         Settings {
             depth,
             fill_rule,
@@ -198,6 +245,7 @@ impl ResultArguments {
             decimate,
             max_triangles,
             unit: self.units,
+            normals,
             tag_patches: self.tag_patches,
             strict,
         }
@@ -247,7 +295,7 @@ fn parse_angle(text: &str) -> Result<f64, String> {
 }
 
 /// A unit by its name or its sign.
-fn parse_unit(text: &str) -> Result<LengthUnit, String> {
+pub fn parse_unit(text: &str) -> Result<LengthUnit, String> {
     let name = match text {
         "um" => "micron",
         "mm" => "millimeter",

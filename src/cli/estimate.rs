@@ -6,9 +6,9 @@ use std::process::ExitCode;
 
 use brickmend::io::{Format, format_of_extension};
 use brickmend::repair::{Estimate, estimate};
-use clap::{Args, ValueEnum};
+use clap::Args;
 
-use crate::cli::arguments::{ResourceArguments, ResultArguments};
+use crate::cli::arguments::{FormatName, ResourceArguments, ResultArguments};
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
 use crate::cli::progress::{Chatter, Progress};
 use crate::cli::signals::Stop;
@@ -32,30 +32,6 @@ pub struct EstimateArguments {
     /// Print the estimate as JSON on stdout; see docs/estimate.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
-}
-
-#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
-enum FormatName {
-    Obj,
-    Stl,
-    Ply,
-    Off,
-    #[value(name = "3mf")]
-    ThreeMf,
-    Glb,
-}
-
-impl From<FormatName> for Format {
-    fn from(name: FormatName) -> Self {
-        match name {
-            FormatName::Obj => Self::Obj,
-            FormatName::Stl => Self::Stl,
-            FormatName::Ply => Self::Ply,
-            FormatName::Off => Self::Off,
-            FormatName::ThreeMf => Self::ThreeMf,
-            FormatName::Glb => Self::Glb,
-        }
-    }
 }
 
 impl EstimateArguments {

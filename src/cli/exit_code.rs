@@ -12,7 +12,10 @@ pub enum Exit {
     Internal = 1,
     /// The command line asks for what cannot be.
     Usage = 2,
-    /// The result has no triangle, or another method's is not sound.
+    /// A batch is done, and some of its models failed.
+    SomeFailed = 3,
+    /// The result has no triangle, or another method's is not sound; or an inspection that was to
+    /// check found defects.
     NoResult = 4,
     /// Output or scratch cannot be used.
     Unusable = 5,
@@ -38,7 +41,13 @@ impl From<Exit> for ExitCode {
 
 impl From<&RepairError> for Exit {
     fn from(error: &RepairError) -> Self {
-        match error.blame() {
+        Self::from(error.blame())
+    }
+}
+
+impl From<Blame> for Exit {
+    fn from(blame: Blame) -> Self {
+        match blame {
             Blame::Internal => Self::Internal,
             Blame::Usage => Self::Usage,
             Blame::Model => Self::NoResult,
@@ -58,7 +67,8 @@ Exit status:
   0    done (the outcome may still ask for a look)
   1    internal error, also a failed proof: nothing is put in place
   2    usage, also a memory budget below the floor or a disk limit below the estimate
-  4    the result has no triangle; or it is not sound, which --method mdc rules out
+  4    the result has no triangle; or it is not sound, which --method mdc rules out; or
+       inspect --check found defects
   5    output or scratch folder unusable, also a full disk: run again to go on
   6    another run holds the work folder
   7    stopped by --max-disk on the way: run again with more to go on

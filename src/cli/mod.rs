@@ -2,13 +2,18 @@
 
 mod allocator;
 mod arguments;
+mod batch;
 mod estimate;
 mod exit_code;
+mod fleet;
+mod inspect;
 mod last_words;
 mod memory;
 mod progress;
 mod repair;
 mod signals;
+mod status;
+mod worker;
 
 use clap::{Parser, Subcommand};
 
@@ -33,6 +38,15 @@ struct Arguments {
 enum Command {
     /// Repair one model.
     Repair(repair::RepairArguments),
+    /// Tell what is wrong with models; changes nothing.
+    Inspect(inspect::InspectArguments),
+    /// Repair a folder of models, as far as that is not done.
+    Batch(batch::BatchArguments),
+    /// Tell where a folder of results stands.
+    Status(status::StatusArguments),
+    /// Work for a batch.
+    #[command(hide = true)]
+    Worker(worker::WorkerArguments),
     /// Tell what a repair will take: leaves, memory, disk, seconds.
     Estimate(estimate::EstimateArguments),
 }
@@ -45,6 +59,10 @@ pub fn run() -> std::process::ExitCode {
     let chatter = Chatter::new(arguments.quiet, arguments.verbose);
     match arguments.command {
         Command::Repair(arguments) => repair::run(&arguments, &chatter),
+        Command::Inspect(arguments) => inspect::run(&arguments, &chatter),
+        Command::Batch(arguments) => batch::run(&arguments, &chatter),
+        Command::Status(arguments) => status::run(&arguments, &chatter),
+        Command::Worker(arguments) => worker::run(&arguments),
         Command::Estimate(arguments) => estimate::run(&arguments, &chatter),
     }
 }

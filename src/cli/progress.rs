@@ -35,6 +35,16 @@ impl Chatter {
         self.quiet
     }
 
+    /// Whether more than usual is told.
+    pub fn is_verbose(self) -> bool {
+        self.verbose > 0
+    }
+
+    /// Whether there is a terminal to draw on.
+    pub fn has_bars(self) -> bool {
+        self.bars
+    }
+
     /// Says `text` unless told to be quiet.
     pub fn say(self, text: &str) {
         if !self.quiet {

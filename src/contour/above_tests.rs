@@ -92,6 +92,7 @@ impl Solid {
             crease_deg: 12.0,
             decimate_cells,
             surfaces: SurfaceDetail::None,
+            sources: false,
         };
         let found = contour_bricks(&domain, bricks, &options, backing, threads);
         assert!(found.proof.holds(), "{:?}", found.proof.failures());

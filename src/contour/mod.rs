@@ -96,6 +96,8 @@ pub struct ContourOptions {
     pub decimate_cells: f64,
     /// What triangles tell of what they are ([`crate::mesh::Surface`]).
     pub surfaces: SurfaceDetail,
+    /// Whether they tell of the source triangles that they come from; only with surfaces.
+    pub sources: bool,
 }
 
 /// What triangles of the output tell of what they are.

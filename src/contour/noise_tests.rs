@@ -19,7 +19,7 @@ use crate::octree::{
     SourcePlane, decode_cells, edge_position, encode,
 };
 use crate::store::{Backing, BrickFile, BrickWriter, NoCheckpoints, Resources, Scratch};
-use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
+use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
 
 /// The grid of the tests: 2 x 2 x 2 bricks.
 const DEPTH: u32 = 6;
@@ -167,6 +167,7 @@ pub fn contour_by(method: Method, field: &Field, backing: Backing, threads: usiz
         crease_deg: 12.0,
         decimate_cells: field.decimate_cells,
         surfaces: SurfaceDetail::None,
+        sources: false,
     };
     contour_bricks(&domain, (0..8).map(|key| (key, brick(key))), &options, backing, threads)
 }
@@ -213,8 +214,12 @@ pub fn contour_bricks(
         .expect("sound bricks");
     let source = ListedTriangles::with_indices(&kept.vertices, kept.triangles.clone());
     let mut open = || -> Result<ProvedSource<_>, Infallible> { Ok(Box::new(source.clone())) };
-    let proof_options =
-        ProofOptions { share_bytes: 32 << 20, outward: Outward::NotAsked, intersections: true };
+    let proof_options = ProofOptions {
+        share_bytes: 32 << 20,
+        outward: Outward::NotAsked,
+        vertices: Vertices::Numbers,
+        intersections: true,
+    };
     let proof = prove(&mut open, &scratch, &proof_options, &pool, &Void).expect("room");
     Contoured { kept, proof, stats, far_points }
 }

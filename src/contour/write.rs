@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use crate::contour::maker::Maker;
 use crate::contour::mdc::{BrickTriangles, FAN_POINT, Layers, VERTICES};
 use crate::contour::{ContourError, ContourOptions, ContourStats, Method, mc};
-use crate::mesh::{MeshSink, SinkState, SinkTriangles};
+use crate::mesh::{DrawnFrom, MeshSink, SinkState, SinkTriangles};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::Domain;
 use crate::store::{BrickFile, Progress, Resources, StoreError, ordered_by_weight};
@@ -201,6 +201,7 @@ where
             indices: &brick.indices,
             corners: &brick.corners,
             surfaces: &brick.surfaces,
+            from: DrawnFrom { sources: &brick.sources, inner: &brick.inner },
             ..SinkTriangles::default()
         };
         self.sink.triangles(&triangles).map_err(WriteError::Sink)?;

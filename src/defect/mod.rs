@@ -1,4 +1,5 @@
-//! What can be wrong with a mesh: one file per defect, found by the proof and told with its place.
+//! What can be wrong with a mesh: one file per defect, found by the proof and by the diagnosis and
+//! told with its place.
 //!
 //! A defect is data, never an error. Positions are in model units; triangle numbers count the
 //! triangles of the file from 0; vertex numbers exist only in formats that have indices.
@@ -6,26 +7,50 @@
 mod boundary_edge;
 mod coincident_vertices;
 mod degenerate_triangle;
+mod duplicate_triangle;
+mod fin;
+mod hidden_shell;
 mod inconsistent_edge;
 mod intersecting_triangles;
 mod inward_component;
+mod isolated_vertex;
 mod kind;
 mod nonfinite_triangle;
 mod nonmanifold_edge;
 mod nonmanifold_vertex;
+mod open_loop;
+mod open_shell;
+mod overlapping_triangles;
 mod place;
+mod smallest;
+mod t_junction;
+mod thin_wall;
+mod tiny_shell;
+mod touching_triangles;
 
 pub use boundary_edge::BoundaryEdge;
 pub use coincident_vertices::CoincidentVertices;
 pub use degenerate_triangle::DegenerateTriangle;
+pub use duplicate_triangle::DuplicateTriangle;
+pub use fin::Fin;
+pub use hidden_shell::HiddenShell;
 pub use inconsistent_edge::InconsistentEdge;
-pub use intersecting_triangles::IntersectingTriangles;
+pub use intersecting_triangles::{IntersectingTriangles, Meeting, MeetingCounts};
 pub use inward_component::InwardComponent;
+pub use isolated_vertex::IsolatedVertex;
 pub use kind::DefectKind;
 pub use nonfinite_triangle::NonfiniteTriangle;
 pub use nonmanifold_edge::NonmanifoldEdge;
 pub use nonmanifold_vertex::NonmanifoldVertex;
+pub use open_loop::OpenLoop;
+pub use open_shell::OpenShell;
+pub use overlapping_triangles::OverlappingTriangles;
 pub use place::{EdgePlace, VertexPlace};
+pub use smallest::{MOST_PLACES, Smallest};
+pub use t_junction::TJunction;
+pub use thin_wall::ThinWall;
+pub use tiny_shell::TinyShell;
+pub use touching_triangles::TouchingTriangles;
 
 use std::fmt;
 
@@ -40,20 +65,42 @@ pub enum Defect {
     NonfiniteTriangle(NonfiniteTriangle),
     /// A rim.
     BoundaryEdge(BoundaryEdge),
+    /// A rim all around.
+    OpenLoop(OpenLoop),
     /// More than two triangles at one edge.
     NonmanifoldEdge(NonmanifoldEdge),
     /// Two neighbours that disagree about the outside.
     InconsistentEdge(InconsistentEdge),
     /// Sheets that touch in a point only.
     NonmanifoldVertex(NonmanifoldVertex),
-    /// A triangle without area.
-    DegenerateTriangle(DegenerateTriangle),
-    /// Two vertices in one place.
-    CoincidentVertices(CoincidentVertices),
     /// A closed surface that is inside out.
     InwardComponent(InwardComponent),
     /// Two triangles that go through each other or touch.
     IntersectingTriangles(IntersectingTriangles),
+    /// Two triangles that share an area.
+    OverlappingTriangles(OverlappingTriangles),
+    /// A triangle that is there already.
+    DuplicateTriangle(DuplicateTriangle),
+    /// A triangle without area.
+    DegenerateTriangle(DegenerateTriangle),
+    /// A vertex on an edge that does not know it.
+    TJunction(TJunction),
+    /// A sheet that hangs from a surface.
+    Fin(Fin),
+    /// A shell with a rim.
+    OpenShell(OpenShell),
+    /// A wall that is thin.
+    ThinWall(ThinWall),
+    /// A shell that nobody sees.
+    HiddenShell(HiddenShell),
+    /// A shell that is small for the model.
+    TinyShell(TinyShell),
+    /// Two triangles that touch.
+    TouchingTriangles(TouchingTriangles),
+    /// Two vertices in one place.
+    CoincidentVertices(CoincidentVertices),
+    /// A vertex that nothing uses.
+    IsolatedVertex(IsolatedVertex),
 }
 
 impl Defect {
@@ -63,29 +110,51 @@ impl Defect {
         match self {
             Self::NonfiniteTriangle(_) => DefectKind::NonfiniteTriangle,
             Self::BoundaryEdge(_) => DefectKind::BoundaryEdge,
+            Self::OpenLoop(_) => DefectKind::OpenLoop,
             Self::NonmanifoldEdge(_) => DefectKind::NonmanifoldEdge,
             Self::InconsistentEdge(_) => DefectKind::InconsistentEdge,
             Self::NonmanifoldVertex(_) => DefectKind::NonmanifoldVertex,
-            Self::DegenerateTriangle(_) => DefectKind::DegenerateTriangle,
-            Self::CoincidentVertices(_) => DefectKind::CoincidentVertices,
             Self::InwardComponent(_) => DefectKind::InwardComponent,
             Self::IntersectingTriangles(_) => DefectKind::IntersectingTriangles,
+            Self::OverlappingTriangles(_) => DefectKind::OverlappingTriangles,
+            Self::DuplicateTriangle(_) => DefectKind::DuplicateTriangle,
+            Self::DegenerateTriangle(_) => DefectKind::DegenerateTriangle,
+            Self::TJunction(_) => DefectKind::TJunction,
+            Self::Fin(_) => DefectKind::Fin,
+            Self::OpenShell(_) => DefectKind::OpenShell,
+            Self::ThinWall(_) => DefectKind::ThinWall,
+            Self::HiddenShell(_) => DefectKind::HiddenShell,
+            Self::TinyShell(_) => DefectKind::TinyShell,
+            Self::TouchingTriangles(_) => DefectKind::TouchingTriangles,
+            Self::CoincidentVertices(_) => DefectKind::CoincidentVertices,
+            Self::IsolatedVertex(_) => DefectKind::IsolatedVertex,
         }
     }
 
-    /// A point to look at, in model units; a triangle with a corner at infinity has none.
+    /// A point to look at, in model units; a triangle with a corner at infinity has none, and a
+    /// vertex that nothing uses is known by its number only.
     #[must_use]
     pub fn place(&self) -> Option<[f64; 3]> {
         match self {
-            Self::NonfiniteTriangle(_) => None,
+            Self::NonfiniteTriangle(_) | Self::IsolatedVertex(_) => None,
             Self::BoundaryEdge(edge) => Some(edge.edge.middle()),
             Self::NonmanifoldEdge(edge) => Some(edge.edge.middle()),
             Self::InconsistentEdge(edge) => Some(edge.edge.middle()),
             Self::NonmanifoldVertex(vertex) => Some(vertex.vertex.position),
             Self::DegenerateTriangle(triangle) => Some(triangle.corners[0]),
-            Self::CoincidentVertices(pair) => Some(pair.position),
-            Self::InwardComponent(component) => Some(component.position),
-            Self::IntersectingTriangles(pair) => Some(pair.position),
+            Self::OpenLoop(defect) => Some(defect.position),
+            Self::InwardComponent(defect) => Some(defect.position),
+            Self::IntersectingTriangles(defect) => Some(defect.position),
+            Self::OverlappingTriangles(defect) => Some(defect.position),
+            Self::DuplicateTriangle(defect) => Some(defect.position),
+            Self::TJunction(defect) => Some(defect.position),
+            Self::Fin(defect) => Some(defect.position),
+            Self::OpenShell(defect) => Some(defect.position),
+            Self::ThinWall(defect) => Some(defect.position),
+            Self::HiddenShell(defect) => Some(defect.position),
+            Self::TinyShell(defect) => Some(defect.position),
+            Self::TouchingTriangles(defect) => Some(defect.position),
+            Self::CoincidentVertices(defect) => Some(defect.position),
         }
     }
 }
@@ -95,13 +164,24 @@ impl fmt::Display for Defect {
         match self {
             Self::NonfiniteTriangle(defect) => defect.fmt(f),
             Self::BoundaryEdge(defect) => defect.fmt(f),
+            Self::OpenLoop(defect) => defect.fmt(f),
             Self::NonmanifoldEdge(defect) => defect.fmt(f),
             Self::InconsistentEdge(defect) => defect.fmt(f),
             Self::NonmanifoldVertex(defect) => defect.fmt(f),
-            Self::DegenerateTriangle(defect) => defect.fmt(f),
-            Self::CoincidentVertices(defect) => defect.fmt(f),
             Self::InwardComponent(defect) => defect.fmt(f),
             Self::IntersectingTriangles(defect) => defect.fmt(f),
+            Self::OverlappingTriangles(defect) => defect.fmt(f),
+            Self::DuplicateTriangle(defect) => defect.fmt(f),
+            Self::DegenerateTriangle(defect) => defect.fmt(f),
+            Self::TJunction(defect) => defect.fmt(f),
+            Self::Fin(defect) => defect.fmt(f),
+            Self::OpenShell(defect) => defect.fmt(f),
+            Self::ThinWall(defect) => defect.fmt(f),
+            Self::HiddenShell(defect) => defect.fmt(f),
+            Self::TinyShell(defect) => defect.fmt(f),
+            Self::TouchingTriangles(defect) => defect.fmt(f),
+            Self::CoincidentVertices(defect) => defect.fmt(f),
+            Self::IsolatedVertex(defect) => defect.fmt(f),
         }
     }
 }

@@ -1,14 +1,17 @@
 //! Exact and small geometry: no files, no threads, no cells.
 
 mod closest;
+pub mod crossing;
 mod ear_clipping;
 mod mix;
 pub mod morton;
 pub mod orientation;
 pub mod qef;
+pub mod signs;
 pub mod triangle_triangle;
 #[cfg(test)]
 mod triangle_triangle_tests;
+mod wide;
 
 pub use closest::closest_on_triangle;
 pub use ear_clipping::EarClipper;

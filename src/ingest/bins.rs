@@ -75,7 +75,7 @@ pub fn fill_bins(
     let mut histogram = AreaHistogram::new(soup.facts.bounds);
     let mut filter = CrowdFilter::new(domain);
     let mut sorter = Sorter::<BinTriangle>::new(resources.scratch, resources.share_bytes);
-    let mut next = 0;
+    let (mut next, mut looks) = (0, Vec::new());
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
     ordered(
         resources.pool,
@@ -85,6 +85,7 @@ pub fn fill_bins(
             }
             let mut triangles = Vec::new();
             soup.spool.read(next, ITEM_TRIANGLES, &mut triangles)?;
+            soup.looks.put_on(next, &mut triangles, &mut looks)?;
             next += triangles.len() as u64;
             triangles.iter().for_each(|triangle| histogram.add(triangle));
             let is_last = triangles.is_empty();

@@ -1,7 +1,8 @@
 //! Takes a file in: triangles on the lattice, in the bins of the bricks that they touch.
 //!
 //! In:         a [`crate::mesh::MeshSource`].
-//! Out:        [`Soup`] (a spool of finite triangles, box, names, counts), then [`Bins`] (the same
+//! Out:        [`Soup`] (a spool of finite triangles, box, names, counts; texture coordinates and
+//!             colours where the output takes them, and the looks that part them), then [`Bins`] (the same
 //!             triangles once per brick that they touch, by brick and source number), then
 //!             [`Settled`] (which copies of duplicates count, and how much of the soup is open).
 //! Invariant:  a triangle lies in the bin of every brick whose closed box it meets; of copies, one
@@ -13,6 +14,7 @@
 
 mod area;
 mod bins;
+mod charts;
 mod crowds;
 mod duplicates;
 mod edges;
@@ -20,6 +22,7 @@ mod error;
 mod examine;
 mod facts;
 mod fins;
+mod looks;
 mod names;
 mod packed;
 mod rims;
@@ -34,7 +37,8 @@ pub use crowds::LeftOut;
 pub use duplicates::{DROPS, SettleStats, Settled, settle};
 pub use error::IngestError;
 pub use fins::{FinStats, SheetRule, drop_fins};
+pub use looks::{LOOK_MATERIALS, LOOKS};
 pub use names::{PART_NAMES, names_of_parts};
 pub use rims::Rims;
-pub use soup::{ATTRIBUTES, AttributeRecord, SOUP, Soup, SoupFacts, SoupStats, read_soup};
+pub use soup::{ATTRIBUTES, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use sums::{SoupSums, sum_up};

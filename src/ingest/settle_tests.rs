@@ -5,6 +5,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use proptest::prelude::*;
 
 use crate::ingest::{SettleStats, fill_bins, read_soup, settle};
+use crate::mesh::Attributes;
 use crate::mesh::shapes::{Corners, ListedTriangles, Random, cuboid, shuffle, sphere};
 use crate::monitor::Void;
 use crate::octree::{BrickKey, Domain};
@@ -36,7 +37,7 @@ fn settled(soup: &[Corners], depth: u32, share_bytes: u64, threads: usize) -> Sa
         monitor: &Void,
     };
     let mut source = ListedTriangles::without_indices(soup.to_vec());
-    let read = read_soup(&mut source, true, &resources).expect("a sound soup");
+    let read = read_soup(&mut source, true, Attributes::NONE, &resources).expect("a sound soup");
     let domain = Domain::around(&read.facts.bounds, depth, false).expect("room enough");
     let (bins, _) = fill_bins(&read, &domain, &resources).expect("room on the disk");
     let settled = settle(&bins, &domain, read.facts.stats.triangles, &resources).expect("room");

@@ -1,32 +1,20 @@
 //! First pass: the file becomes a spool of finite triangles.
 
-use bytemuck::{Pod, Zeroable};
 use serde::{Deserialize, Serialize};
 
 use crate::ingest::error::IngestError;
+use crate::ingest::looks::{LOOK_MATERIALS, LOOKS, Looks, find_looks, no_looks};
 use crate::ingest::names::{PART_NAMES, write_materials, write_names};
-use crate::io::MATERIALS;
-use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, TriangleBatch};
+use crate::io::{IMAGES, IoError, MATERIALS, Palette};
+use crate::mesh::{Attributes, Discarded, LengthUnit, Material, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
-use crate::octree::{SnapBox, SoupTriangle, TRANSPARENT};
+use crate::octree::{AttributeRecord, SnapBox, SoupTriangle, TRANSPARENT};
 use crate::store::{FileState, Resources, Spool, SpoolWriter, StoreError};
 
 /// Spool of the triangles.
 pub const SOUP: &str = "soup.spool";
-/// Side file of the attributes, one record per delivered triangle.
+/// Side file of the attributes, one record per delivered triangle; empty where none are wanted.
 pub const ATTRIBUTES: &str = "attributes.spool";
-
-/// Texture coordinates, colours and polygon of one triangle, by source number. 40 bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
-#[repr(C)]
-pub struct AttributeRecord {
-    /// Texture coordinates of the corners; zero where the file has none.
-    pub uvs: [[f32; 2]; 3],
-    /// RGBA colours of the corners; zero where the file has none.
-    pub colours: [[u8; 4]; 3],
-    /// Number of the polygon in the file.
-    pub polygon: u32,
-}
 
 /// What was found out about the input while it was read.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -45,6 +33,10 @@ pub struct SoupFacts {
     pub has_uvs: bool,
     /// Whether the file has colours of vertices.
     pub has_colours: bool,
+    /// Whether the file has normals.
+    pub has_normals: bool,
+    /// Looks that triangles have; 0 where they have materials in their place.
+    pub looks: u64,
     /// Counts.
     pub stats: SoupStats,
 }
@@ -80,11 +72,13 @@ impl SoupStats {
 pub struct Soup {
     /// Finite triangles in file order.
     pub spool: Spool<SoupTriangle>,
-    /// Texture coordinates and colours, where the file has any.
-    pub attributes: Option<Spool<AttributeRecord>>,
-    /// The spools of the names of parts, see [`crate::ingest::PART_NAMES`], and of the materials,
-    /// see [`crate::io::MATERIALS`].
-    pub names: [FileState; 2],
+    /// Texture coordinates and colours, as far as the file has any that are wanted.
+    pub attributes: Spool<AttributeRecord>,
+    /// What parts them, or nothing.
+    pub looks: Looks,
+    /// The spools of the names of parts, see [`crate::ingest::PART_NAMES`], of the materials, see
+    /// [`crate::io::MATERIALS`], and of the images, see [`crate::io::IMAGES`].
+    pub names: [FileState; 3],
     /// What was found out.
     pub facts: SoupFacts,
 }
@@ -99,37 +93,56 @@ impl Soup {
         files: &[FileState],
         facts: SoupFacts,
     ) -> Result<Self, StoreError> {
-        let attributes = files.iter().find(|file| file.name == ATTRIBUTES);
         Ok(Self {
             spool: Spool::open(resources.scratch, FileState::find(files, SOUP)?)?,
-            attributes: attributes.map(|f| Spool::open(resources.scratch, f)).transpose()?,
+            attributes: Spool::open(resources.scratch, FileState::find(files, ATTRIBUTES)?)?,
+            looks: Looks {
+                of_triangles: Spool::open(resources.scratch, FileState::find(files, LOOKS)?)?,
+                materials: Spool::open(resources.scratch, FileState::find(files, LOOK_MATERIALS)?)?,
+            },
             names: [
                 FileState::find(files, PART_NAMES)?.clone(),
                 FileState::find(files, MATERIALS)?.clone(),
+                FileState::find(files, IMAGES)?.clone(),
             ],
             facts,
         })
     }
 
+    /// Finds the looks of a soup that was read, where it has texture coordinates or colours.
+    ///
+    /// # Errors
+    /// The scratch disk fails, or the caller cancels.
+    pub fn part_looks(&mut self, resources: &Resources) -> Result<(), IoError> {
+        if !self.attributes.is_empty() {
+            let palette = Palette::new(resources.scratch, &self.names[1]);
+            self.looks = find_looks(&palette, (&self.spool, &self.attributes), resources)?;
+            self.facts.looks = self.looks.materials.len();
+        }
+        Ok(())
+    }
+
     /// The files, as they have to be found again.
     #[must_use]
     pub fn files(&self) -> Vec<FileState> {
-        let attributes = self.attributes.as_ref().map(|spool| spool.state().clone());
-        let names = self.names.iter().cloned();
-        std::iter::once(self.spool.state().clone()).chain(names).chain(attributes).collect()
+        let Looks { of_triangles, materials } = &self.looks;
+        let spools =
+            [self.spool.state(), self.attributes.state(), of_triangles.state(), materials.state()];
+        spools.into_iter().chain(&self.names).cloned().collect()
     }
 }
 
-/// Reads `source` to its end.
+/// Reads `source` to its end, and keeps of its texture coordinates and colours what is `wanted`.
 ///
 /// # Errors
 /// [`IngestError`]: the source fails, the disk is full, or `strict` met a broken face.
 pub fn read_soup<S: MeshSource + ?Sized>(
     source: &mut S,
     strict: bool,
+    wanted: Attributes,
     resources: &Resources,
 ) -> Result<Soup, IngestError<S::Error>> {
-    let mut writer = Writer::new(resources)?;
+    let mut writer = Writer::new(wanted, resources)?;
     let mut batch = TriangleBatch::default();
     let mut read_bytes = 0;
     while source.next_batch(&mut batch).map_err(IngestError::Source)? {
@@ -156,11 +169,14 @@ pub fn read_soup<S: MeshSource + ?Sized>(
     stats.refuse_broken(strict)?;
     let (parts, materials) = (source.part_count(), source.material_count());
     let has_materials = has_materials(source)?;
-    let names = [write_names(source, resources)?, write_materials(source, resources)?];
+    let part_names = write_names(source, resources)?;
+    let [materials_state, images] = write_materials(source, resources)?;
+    let names = [part_names, materials_state, images];
+    let (spool, attributes) = (writer.spool.finish()?, writer.attributes.finish()?);
     Ok(Soup {
-        spool: writer.spool.finish()?,
+        spool,
         names,
-        attributes: writer.attributes.map(SpoolWriter::finish).transpose()?,
+        attributes,
         facts: SoupFacts {
             bounds: writer.bounds,
             unit: source.unit(),
@@ -169,9 +185,18 @@ pub fn read_soup<S: MeshSource + ?Sized>(
             has_materials,
             has_uvs: writer.has_uvs,
             has_colours: writer.has_colours,
+            has_normals: source.has_normals(),
+            looks: 0,
             stats,
         },
+        looks: no_looks(resources)?,
     })
+}
+
+/// Texture coordinates without NaN and infinities, which are zero.
+fn finite(uvs: &[[f32; 2]; 3]) -> [[f32; 2]; 3] {
+    // Adding zero turns -0 into 0: both are one place.
+    uvs.map(|uv| uv.map(|x| if x.is_finite() { x + 0.0 } else { 0.0 }))
 }
 
 /// Whether a source that was read to its end says anything of materials.
@@ -185,10 +210,10 @@ pub(super) fn has_materials<S: MeshSource + ?Sized>(
     })
 }
 
-struct Writer<'r> {
-    resources: Resources<'r>,
+struct Writer {
     spool: SpoolWriter<SoupTriangle>,
-    attributes: Option<SpoolWriter<AttributeRecord>>,
+    attributes: SpoolWriter<AttributeRecord>,
+    wanted: Attributes,
     bounds: SnapBox,
     delivered: u64,
     transparent: u64,
@@ -198,12 +223,12 @@ struct Writer<'r> {
     last_material: Option<(u32, u32)>,
 }
 
-impl<'r> Writer<'r> {
-    fn new(resources: &Resources<'r>) -> Result<Self, StoreError> {
+impl Writer {
+    fn new(wanted: Attributes, resources: &Resources) -> Result<Self, StoreError> {
         Ok(Self {
-            resources: *resources,
             spool: SpoolWriter::create(resources.scratch, SOUP)?,
-            attributes: None,
+            attributes: SpoolWriter::create(resources.scratch, ATTRIBUTES)?,
+            wanted,
             bounds: SnapBox::EMPTY,
             delivered: 0,
             transparent: 0,
@@ -220,16 +245,15 @@ impl<'r> Writer<'r> {
     ) -> Result<(), IngestError<S::Error>> {
         self.has_uvs |= !batch.uvs.is_empty();
         self.has_colours |= !batch.colours.is_empty();
-        let with_attributes = !batch.uvs.is_empty() || !batch.colours.is_empty();
-        if with_attributes && self.attributes.is_none() {
-            self.attributes = Some(SpoolWriter::create(self.resources.scratch, ATTRIBUTES)?);
-        }
+        let uvs = if self.wanted.uvs { batch.uvs.as_slice() } else { &[] };
+        let colours = if self.wanted.colours { batch.colours.as_slice() } else { &[] };
         for (i, corners) in batch.corners.iter().enumerate() {
-            if let Some(attributes) = &mut self.attributes {
-                attributes.push(AttributeRecord {
-                    uvs: batch.uvs.get(i).copied().unwrap_or_default(),
-                    colours: batch.colours.get(i).copied().unwrap_or_default(),
-                    polygon: batch.polygons[i],
+            if !uvs.is_empty() || !colours.is_empty() {
+                self.attributes.push(AttributeRecord {
+                    corners: *corners,
+                    uvs: uvs.get(i).map(finite).unwrap_or_default(),
+                    colours: colours.get(i).copied().unwrap_or_default(),
+                    unused: 0,
                 })?;
             }
             let number = self.delivered as u32;

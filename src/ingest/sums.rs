@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::error::IngestError;
 use crate::ingest::rims::{RimSketch, Rims};
 use crate::ingest::soup::{SoupStats, has_materials};
-use crate::mesh::{LengthUnit, MeshSource, TriangleBatch};
+use crate::mesh::{Attributes, LengthUnit, MeshSource, TriangleBatch};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::SnapBox;
 use crate::store::StoreError;
@@ -40,8 +40,8 @@ pub struct SoupSums {
     pub unit: Option<LengthUnit>,
     /// Edges that an odd number of triangles shares.
     pub rims: Rims,
-    /// Whether there are texture coordinates or colours.
-    pub has_attributes: bool,
+    /// What triangles have besides a place and a material.
+    pub attributes: Attributes,
     /// Whether the file says anything of materials.
     pub has_materials: bool,
 }
@@ -75,7 +75,8 @@ pub fn sum_up<S: MeshSource + ?Sized>(
         if monitor.cancelled() {
             return Err(StoreError::Cancelled.into());
         }
-        adder.sums.has_attributes |= !batch.uvs.is_empty() || !batch.colours.is_empty();
+        adder.sums.attributes.uvs |= !batch.uvs.is_empty();
+        adder.sums.attributes.colours |= !batch.colours.is_empty();
         batch.corners.iter().for_each(|corners| adder.add(corners));
         if adder.sums.stats.triangles > u64::from(u32::MAX) {
             return Err(IngestError::TooManyTriangles { limit: u32::MAX.into() });
@@ -84,6 +85,7 @@ pub fn sum_up<S: MeshSource + ?Sized>(
     monitor.count(Counter::InputBytesRead, source.bytes_read() - read_bytes);
     adder.sums.has_materials = has_materials(source)?;
     adder.sums.unit = source.unit();
+    adder.sums.attributes.normals = source.has_normals();
     let mut sums = adder.sums;
     sums.stats.discarded = source.discarded();
     sums.stats.input_bytes = source.bytes_read();
@@ -107,7 +109,7 @@ impl Adder {
             extent: 0.0,
             unit: None,
             rims: Rims::default(),
-            has_attributes: false,
+            attributes: Attributes::NONE,
             has_materials: false,
         };
         Self { sums, rims: RimSketch::new() }

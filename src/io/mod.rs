@@ -7,11 +7,20 @@
 //! written exactly (OBJ, PLY, OFF and 3MF as `f64`, STL and GLB rounded to `f32`). Units: model
 //! units.
 //!
+//! Inside, v of texture coordinates goes up. OBJ holds them, normals and colours (without alpha),
+//! GLB all of it, PLY and 3MF no normals; a triangle of 3MF has either an image or colours. GLB and
+//! 3MF hold the images of their materials (3MF PNG and JPEG, GLB also WebP, KTX 2 and AVIF), OBJ
+//! and PLY name them: those beside the input where they are, those inside of it beside the output.
+//! Each is one of a model in its own folder, or is left out and told.
+//!
 //! Memory: [`ReadOptions::share_bytes`] (at least 96 KiB, 512 KiB for glTF), the names of parts and
 //! materials, and the largest polygon; OBJ files up to 4 MiB are held whole by `tobj`, primitives
 //! that Draco has compressed are decoded whole, and of 3MF a tag of up to 1 MiB is held. A writer
-//! holds 256 KiB for each file; that of GLB 4 MiB more in the end.
+//! holds 256 KiB for each file, and the vertices of one call; those of GLB and 3MF 8 MiB more in the
+//! end.
 
+#[cfg(test)]
+mod attribute_tests;
 mod beside;
 mod detect;
 mod error;
@@ -32,10 +41,13 @@ mod polygon;
 mod stl;
 #[cfg(test)]
 mod tests;
+mod textures;
 mod threemf;
 mod words;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
 
 use crate::io::detect::open_model;
 pub use crate::io::detect::{detect, format_of_extension, format_of_name};
@@ -45,12 +57,13 @@ pub use crate::io::obj::{LIBRARY_MARK, library_name, write_library};
 use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
 pub use crate::io::output::{ASIDE, check_output};
-pub use crate::io::palette::{MATERIALS, Palette, PaletteWriter};
+pub use crate::io::packed::content_name as unpacked_name;
+pub use crate::io::palette::{IMAGES, MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
 use crate::io::stl::{StlWriter, open_stl};
+pub use crate::io::textures::{ImageBeside, images_beside, lost_of_materials};
 use crate::io::threemf::{ThreeMfReader, ThreeMfWriter};
-pub use crate::io::packed::content_name as unpacked_name;
-use crate::mesh::{LengthUnit, MeshSink, MeshSource, SinkState};
+use crate::mesh::{Attributes, LengthUnit, MeshSink, MeshSource, SinkState};
 use crate::store::Scratch;
 
 /// The most triangles in one batch.
@@ -112,6 +125,16 @@ impl Format {
         matches!(self, Self::Obj | Self::Ply | Self::ThreeMf | Self::Glb)
     }
 
+    /// What the writer of this format can hold besides positions and materials.
+    #[must_use]
+    pub fn attributes(self) -> Attributes {
+        match self {
+            Self::Obj | Self::Glb => Attributes::ALL,
+            Self::Ply | Self::ThreeMf => Attributes { normals: false, ..Attributes::ALL },
+            Self::Stl | Self::Off => Attributes::NONE,
+        }
+    }
+
     /// Whether a reader of this format learns from it that the numbers are in `unit`.
     #[must_use]
     pub fn holds_unit(self, unit: LengthUnit) -> bool {
@@ -139,6 +162,11 @@ pub struct WriteOptions {
     pub palette: Option<Palette>,
     /// Whether triangles that close what was open are told apart.
     pub tag_patches: bool,
+    /// What vertices and corners will have besides; what [`Format::attributes`] lacks is not
+    /// written. With texture coordinates, materials show their images.
+    pub attributes: Attributes,
+    /// Where the output will be in the end: the ways to images lead from there.
+    pub output: PathBuf,
     /// What a model unit is, for formats that say so (3MF).
     pub unit: Option<LengthUnit>,
     /// File name of the material library beside an OBJ file, see [`library_name`].

@@ -7,7 +7,7 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 
 use crate::io::error::IoError;
-use crate::mesh::{Material, Part};
+use crate::mesh::{Material, OtherMaps, Part, Texture};
 use crate::store::{Dictionary, Scratch, StoreError, Table};
 
 /// Numbered parts.
@@ -54,6 +54,8 @@ const HAS_EMISSIVE: u32 = 4;
 const HAS_OPACITY: u32 = 8;
 const HAS_METALLIC: u32 = 16;
 const HAS_ROUGHNESS: u32 = 32;
+/// Where the set of further maps begins among the flags.
+const MAPS_SHIFT: u32 = 8;
 
 /// Numbered materials.
 pub(crate) struct Materials {
@@ -102,8 +104,15 @@ impl Materials {
             emissive: has(HAS_EMISSIVE).then_some(properties.emissive),
             metallic: has(HAS_METALLIC).then_some(properties.metallic),
             roughness: has(HAS_ROUGHNESS).then_some(properties.roughness),
-            texture: texture.map(|number| self.textures.name(number).map(text)).transpose()?,
+            alpha_cutoff: None,
+            texture: texture.map(|number| self.texture(number)).transpose()?,
+            other_maps: OtherMaps::from_bits((properties.flags >> MAPS_SHIFT) as u8),
         })
+    }
+
+    fn texture(&mut self, number: u32) -> Result<Texture, StoreError> {
+        let text = self.textures.name(number)?;
+        Ok(serde_json::from_slice(&text).expect("textures are numbered as we wrote them"))
     }
 
     /// Replaces what is known of a material besides its name.
@@ -117,7 +126,10 @@ impl Materials {
             (material.roughness.is_some(), HAS_ROUGHNESS),
         ];
         let texture = match &material.texture {
-            Some(name) => 1 + self.textures.number(name.as_bytes())?,
+            Some(texture) => {
+                let text = serde_json::to_string(texture).expect("plain records serialise");
+                1 + self.textures.number(text.as_bytes())?
+            }
             None => 0,
         };
         let properties = Properties {
@@ -127,7 +139,8 @@ impl Materials {
             metallic: material.metallic.unwrap_or_default(),
             roughness: material.roughness.unwrap_or_default(),
             texture,
-            flags: flags.iter().map(|&(has, flag)| if has { flag } else { 0 }).sum(),
+            flags: flags.iter().map(|&(has, flag)| if has { flag } else { 0 }).sum::<u32>()
+                | u32::from(material.other_maps.bits()) << MAPS_SHIFT,
         };
         Ok(self.properties.set(number.into(), properties)?)
     }

@@ -49,6 +49,17 @@ pub(crate) fn push_number(text: &mut Vec<u8>, value: f64) {
     written.expect("a vector takes any bytes");
 }
 
+/// Appends the shortest text that gives a single back, likewise.
+pub(crate) fn push_single(text: &mut Vec<u8>, value: f32) {
+    let size = value.abs();
+    let written = if size != 0.0 && !(1e-6..1e17).contains(&size) {
+        write!(text, "{value:e}")
+    } else {
+        write!(text, "{value}")
+    };
+    written.expect("a vector takes any bytes");
+}
+
 /// Appends a number in decimal digits.
 pub(crate) fn push_count(text: &mut Vec<u8>, mut value: u64) {
     let mut digits = [0; 20];
@@ -80,6 +91,18 @@ mod tests {
             let text = String::from_utf8(text).expect("digits");
             prop_assert_eq!(text.parse::<f64>().expect("a number").to_bits(), bits);
             prop_assert!(text.len() <= 25);
+        }
+
+        #[test]
+        fn singles_come_back_bit_by_bit(bits in any::<u32>()) {
+            let value = f32::from_bits(bits);
+            prop_assume!(!value.is_nan());
+            let mut text = Vec::new();
+            push_single(&mut text, value);
+            let text = String::from_utf8(text).expect("digits");
+            prop_assert_eq!(text.parse::<f32>().expect("a number").to_bits(), bits);
+            // Readers that take doubles come to the same single.
+            prop_assert_eq!(text.parse::<f64>().expect("a number") as f32, value);
         }
 
         #[test]

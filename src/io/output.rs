@@ -16,8 +16,10 @@ const HEAD_BYTES: u64 = 4096;
 pub(crate) const FACES: &str = "output.faces";
 /// Vertices that wait until it is known what stands in front of them.
 pub(crate) const VERTICES: &str = "output.vertices";
+/// What vertices have besides a position, likewise.
+pub(crate) const VALUES: &str = "output.values";
 /// All that may wait beside an output.
-pub const ASIDE: [&str; 2] = [FACES, VERTICES];
+pub const ASIDE: [&str; 3] = [FACES, VERTICES, VALUES];
 
 /// A file that grows at its end.
 #[derive(Debug)]

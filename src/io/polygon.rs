@@ -78,6 +78,13 @@ impl PolygonCutter {
         Ok(())
     }
 
+    /// Says what texture coordinate a corner has that was added before.
+    pub(crate) fn set_uv(&mut self, corner: usize, uv: [f32; 2]) {
+        if let Some(corner) = self.corners.get_mut(corner) {
+            corner.uv = uv;
+        }
+    }
+
     /// Forgets the polygon that is being read.
     #[inline]
     pub(crate) fn clear(&mut self) {

@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::mesh::{OtherMaps, Texture};
+
 /// A material of a file. What the file does not state is `None`.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
 pub struct Material {
@@ -20,8 +22,14 @@ pub struct Material {
     pub metallic: Option<f32>,
     /// 0 for mirrors, 1 for chalk.
     pub roughness: Option<f32>,
-    /// Image of the base colour: a path beside the file, as written there.
-    pub texture: Option<String>,
+    /// Where the image lets more light pass than this it is not there at all (glTF `MASK`).
+    #[serde(default)]
+    pub alpha_cutoff: Option<f32>,
+    /// Image of the base colour.
+    pub texture: Option<Texture>,
+    /// Further maps, of which no more is known.
+    #[serde(default)]
+    pub other_maps: OtherMaps,
 }
 
 /// Colour of a material that states none.

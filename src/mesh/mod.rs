@@ -4,16 +4,21 @@
 
 pub mod shapes;
 
+mod attributes;
 mod batch;
 mod material;
 mod sink;
 mod source;
+mod texture;
 mod unit;
 
+pub use attributes::Attributes;
 pub use batch::{NO_POLYGON, Part, TriangleBatch};
 pub use material::{Material, Surface};
 pub use sink::{
-    CornerForm, CornerValues, MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, VertexValues,
+    CornerForm, CornerValues, DrawnFrom, InnerCrossing, MeshSink, SinkFile, SinkState, SinkStats,
+    SinkTriangles, VertexValues,
 };
 pub use source::{Discarded, MeshSource};
+pub use texture::{Image, OtherMaps, Texture};
 pub use unit::LengthUnit;

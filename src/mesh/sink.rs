@@ -27,6 +27,9 @@ pub struct SinkState {
     /// The vertices that wait beside it, likewise.
     #[serde(default)]
     pub vertices_aside: SinkFile,
+    /// What vertices have besides, likewise.
+    #[serde(default)]
+    pub values_aside: SinkFile,
 }
 
 /// What a sink wrote.
@@ -82,6 +85,28 @@ impl<T> Default for CornerValues<'_, T> {
     }
 }
 
+/// A crossing of the grid that no triangle tells of: one vertex stands for all that is around it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InnerCrossing {
+    /// The vertex.
+    pub vertex: u32,
+    /// Where that is.
+    pub position: [f64; 3],
+    /// What the surface is there.
+    pub surface: Surface,
+    /// The source triangle.
+    pub source: u32,
+}
+
+/// Where triangles come from; all empty unless the sink asks.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct DrawnFrom<'t> {
+    /// Source triangles, parallel to the triangles.
+    pub sources: &'t [u32],
+    /// What there is between them.
+    pub inner: &'t [InnerCrossing],
+}
+
 /// Triangles for a sink, as parallel slices.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct SinkTriangles<'t> {
@@ -96,6 +121,8 @@ pub struct SinkTriangles<'t> {
     pub uvs: CornerValues<'t, [f32; 2]>,
     /// Unit normals; only with [`CornerForm::OfCorners`].
     pub normals: CornerValues<'t, [f32; 3]>,
+    /// Where they come from.
+    pub from: DrawnFrom<'t>,
 }
 
 /// Takes vertices and triangles in order and writes a file.

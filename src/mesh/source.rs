@@ -54,9 +54,30 @@ pub trait MeshSource {
         Ok(Material::default())
     }
 
+    /// Replaces `bytes` by the next of an image's from `offset` on, at most a few 100 KiB; by none
+    /// at its end, or where it cannot be read. Images are numbered as [`crate::mesh::Image`] says,
+    /// and are there once the last batch was delivered.
+    ///
+    /// # Errors
+    /// The file or the scratch folder fails.
+    fn image_block(
+        &mut self,
+        _number: u32,
+        _offset: u64,
+        bytes: &mut Vec<u8>,
+    ) -> Result<(), Self::Error> {
+        bytes.clear();
+        Ok(())
+    }
+
     /// What a model unit is, where the file says so; known once a batch was delivered.
     fn unit(&self) -> Option<LengthUnit> {
         None
+    }
+
+    /// Whether the file has normals; known once the last batch was delivered.
+    fn has_normals(&self) -> bool {
+        false
     }
 
     /// What was left out so far.

@@ -7,6 +7,9 @@ use rkyv::{Archive, Deserialize, Serialize};
 
 use crate::octree::brick::{ArchiveSize, BrickError, ROOT_BYTES, out_of_range};
 
+/// In [`CellBrick::sources`]: not known.
+pub const NO_SOURCE: u32 = u32::MAX;
+
 /// Highest level of a cluster: the whole brick.
 pub const MAX_LEVEL: u32 = 5;
 
@@ -102,6 +105,9 @@ pub struct CellBrick {
     /// What the same crossings are ([`crate::mesh::Surface`]): one for each, or one for all, or
     /// none where the output names no materials.
     pub surfaces: Vec<u32>,
+    /// The source triangles that the same crossings lie on, [`NO_SOURCE`] where none is known:
+    /// likewise, or none where the output has nothing of them.
+    pub sources: Vec<u32>,
     /// Vertices on the faces that the brick owns, by ascending key; numbered after those of cells.
     pub points: Vec<FacePoint>,
     /// Of a brick that may be part of a larger cluster: what that asks of it.
@@ -113,7 +119,7 @@ pub struct CellBrick {
 
 impl ArchiveSize for CellBrick {
     fn archive_bytes(&self) -> usize {
-        let lists = [&self.cells, &self.clusters, &self.banned, &self.surfaces];
+        let lists = [&self.cells, &self.clusters, &self.banned, &self.surfaces, &self.sources];
         let words: usize = lists.iter().map(|list| list.len()).sum();
         let halves = self.offsets.len() + self.flagged.len();
         let places = 12 * self.positions.len() + 24 * self.points.len() + 20 * self.reaches.len();

@@ -30,8 +30,8 @@ pub use brick::{
     encode,
 };
 pub use cell_brick::{
-    Above, ArchivedCellBrick, CellBrick, FacePoint, Facet, MAX_LEVEL, Summary, VertexReach,
-    cluster_over, decode_cells,
+    Above, ArchivedCellBrick, CellBrick, FacePoint, Facet, MAX_LEVEL, NO_SOURCE, Summary,
+    VertexReach, cluster_over, decode_cells,
 };
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{
@@ -48,4 +48,6 @@ pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
 pub use soup_edges::{BorderUse, MOST_USES, Panes, SoupEdges, TrianglePair, each_border};
 pub use touch::for_each_touched_brick;
-pub use triangle::{BinTriangle, CLOSES, DropRecord, SoupTriangle, TRANSPARENT, surface_of};
+pub use triangle::{
+    AttributeRecord, BinTriangle, CLOSES, DropRecord, SoupTriangle, TRANSPARENT, surface_of,
+};

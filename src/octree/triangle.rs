@@ -42,6 +42,20 @@ impl SoupTriangle {
     }
 }
 
+/// Where a triangle of the input is, and what its corners have besides. 112 bytes.
+#[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
+#[repr(C)]
+pub struct AttributeRecord {
+    /// Corners as read, model units; those of a triangle that was dropped may be NaN or infinite.
+    pub corners: [[f64; 3]; 3],
+    /// Texture coordinates of the corners, finite, v up; zero where the file has none.
+    pub uvs: [[f32; 2]; 3],
+    /// RGBA colours of the corners; zero where the file has none.
+    pub colours: [[u8; 4]; 3],
+    /// Zero.
+    pub unused: u32,
+}
+
 /// A triangle in the bin of a brick that it touches. 96 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]

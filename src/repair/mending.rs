@@ -51,6 +51,7 @@ impl Run<'_> {
             thickness: in_model_units(settings.sheet_thickness)?,
             crease_deg: settings.crease_deg,
             bounds: ruler.bounds,
+            keeps_origins: self.has_sources(findings),
         })
     }
 }

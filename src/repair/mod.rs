@@ -13,11 +13,14 @@ mod depth;
 mod error;
 mod estimate;
 mod finish;
+mod inspect;
+mod inspection;
 mod length;
 mod levels;
 mod lock;
 mod mending;
 mod outcome;
+mod painting;
 mod plan;
 mod revising;
 mod run;
@@ -31,13 +34,17 @@ mod workspace;
 pub use deeper::DepthTrial;
 pub use error::{Blame, RepairError};
 pub use estimate::{Bounds, Counts, DiskSteps, ESTIMATE_VERSION, Estimate, estimate};
+pub use inspect::inspect;
+pub use inspection::{
+    INSPECTION_VERSION, InspectSettings, Inspection, ModelSize, RepairCost, ToleranceReport,
+};
 pub use length::{Length, LengthError, Reach};
 pub use levels::Levels;
+pub use lock::lock_folder;
 pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
-pub use lock::lock_folder;
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, HiddenRule, Limits, MaxHole, Settings, ThinRule};
+pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, Settings, ThinRule};

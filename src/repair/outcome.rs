@@ -9,6 +9,7 @@ use crate::bridge::{MendStats, ThickenStats};
 use crate::contour::{ContourStats, SurfaceDetail};
 use crate::hidden::HiddenStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
+use crate::mesh::Attributes;
 use crate::monitor::{Counter, Gauge, Stage};
 use crate::octree::{Domain, SnapBox};
 use crate::patch::{Opening, PatchStats};
@@ -116,6 +117,11 @@ pub struct OutputReport {
 pub struct TransferReport {
     /// What triangles tell of what they are.
     pub surfaces: SurfaceDetail,
+    /// What vertices and corners have.
+    pub attributes: Attributes,
+    /// Sets of triangles of the input that seams of texture coordinates and jumps of colours part;
+    /// 0 where the output has neither.
+    pub looks: u64,
     /// Counts of borders between materials.
     #[serde(flatten)]
     pub borders: BorderStats,

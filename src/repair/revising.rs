@@ -4,7 +4,7 @@
 
 use std::collections::BTreeSet;
 
-use crate::bridge::{Mended, ThickenStats, Thickened, thicken};
+use crate::bridge::{Mended, SLAB_ORIGINS, ThickenStats, Thickened, thicken};
 use crate::contour::{Method, SurfaceDetail};
 use crate::hidden::{Bodies, HiddenStats, Seen, judge, leave_out};
 use crate::ingest::{Bins, names_of_parts};
@@ -20,7 +20,7 @@ use crate::repair::stages::{Findings, Handles, hand_on, open_bricks};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, scan};
 use crate::sign::{Exposed, FillRule, Flooded, find_exposed, find_lost, flood};
-use crate::store::{BrickFile, FileState, NoCheckpoints, Resources};
+use crate::store::{BrickFile, FileState, NoCheckpoints, Resources, SpoolWriter};
 use crate::transfer::{BorderStats, find_borders, no_borders};
 
 /// What the grid makes of a soup; the hits are among the handles.
@@ -68,6 +68,13 @@ impl Run<'_> {
         let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
         let borders = self.find_borders(&soup, hits, findings, resources)?;
         scanned.files.extend(hand_on(borders, &mut handles.borders));
+        scanned.files.push(match &thickened {
+            Some(thickened) => thickened.origins.state().clone(),
+            None => {
+                let none = SpoolWriter::<u32>::create(resources.scratch, SLAB_ORIGINS)?;
+                none.finish()?.state().clone()
+            }
+        });
         Ok(scanned.files)
     }
 
@@ -80,8 +87,9 @@ impl Run<'_> {
         resources: &Resources,
     ) -> Result<BrickFile, RepairError> {
         findings.borders = BorderStats::default();
-        let has_borders = self.surface_detail(findings) != SurfaceDetail::None
-            && (findings.soup().materials > 1 || self.settings.tag_patches)
+        let soup_facts = findings.soup();
+        let has_borders = self.drawn_detail(findings) != SurfaceDetail::None
+            && (soup_facts.materials.max(soup_facts.looks) > 1 || self.settings.tag_patches)
             && self.settings.method == Method::Mdc;
         if !has_borders {
             return Ok(no_borders(resources)?);

@@ -281,6 +281,7 @@ impl Run<'_> {
         loop {
             if !workspace.is_in_place() {
                 self.steps(workspace, pool, &mut findings, &mut handles)?;
+                self.put_images(workspace, &findings)?;
                 self.put_library(workspace, &findings)?;
                 workspace.put_in_place()?;
                 let output = self.level(&findings).output.display();

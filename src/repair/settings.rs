@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::contour::Method;
 use crate::ingest::SheetRule;
-use crate::mesh::LengthUnit;
+use crate::io::Format;
+use crate::mesh::{Attributes, LengthUnit};
 use crate::repair::RepairError;
 use crate::repair::length::{Length, LengthError, Reach};
 use crate::sign::FillRule;
@@ -93,6 +94,19 @@ impl FromStr for MaxHole {
     }
 }
 
+/// Which normals the output gets, where its format holds any.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum NormalRule {
+    /// Normals if the input has some: smooth, but for creases.
+    #[default]
+    Keep,
+    /// The same whatever the input has.
+    Smooth,
+    /// None.
+    None,
+}
+
 /// Everything that changes the result.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -123,6 +137,8 @@ pub struct Settings {
     pub max_triangles: Option<u64>,
     /// What a model unit is, for files that do not say so.
     pub unit: Option<LengthUnit>,
+    /// Which normals the output gets.
+    pub normals: NormalRule,
     /// Whether what closes openings is told apart in the output, where its format can.
     pub tag_patches: bool,
     /// Refuse broken faces in place of dropping them.
@@ -145,6 +161,7 @@ impl Default for Settings {
             decimate: Reach::DEFAULT_DECIMATE,
             max_triangles: None,
             unit: None,
+            normals: NormalRule::Keep,
             tag_patches: false,
             strict: false,
         }
@@ -152,6 +169,20 @@ impl Default for Settings {
 }
 
 impl Settings {
+    /// The attributes that an output of `format` gets if the input has them. Marching cubes does not
+    /// know which triangles its surface comes from.
+    pub(crate) fn takes(&self, format: Format) -> Attributes {
+        let has_sources = self.method != Method::Mc;
+        let normals = self.normals != NormalRule::None;
+        format.attributes().and(Attributes { uvs: has_sources, colours: has_sources, normals })
+    }
+
+    /// The attributes that an output of `format` gets if the input has `given`.
+    pub(crate) fn gets(&self, format: Format, given: Attributes) -> Attributes {
+        let normals = given.normals || self.normals == NormalRule::Smooth;
+        self.takes(format).and(Attributes { normals, ..given })
+    }
+
     /// Refuses what cannot be, whatever the model.
     ///
     /// # Errors

@@ -13,7 +13,7 @@ use crate::ingest::{
     settle,
 };
 use crate::io::{ReadOptions, check_output};
-use crate::mesh::{SinkFile, SinkStats};
+use crate::mesh::{CornerForm, SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::{Domain, Flips};
 use crate::patch::{PatchStats, patch};
@@ -31,7 +31,7 @@ use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
 use crate::sign::{FillRule, FloodStats, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, StoreError};
 use crate::transfer::{BORDERS, BorderStats};
-use crate::verify::{Outward, Proof, ProofOptions, prove};
+use crate::verify::{Outward, Proof, ProofOptions, Vertices, prove};
 
 /// A level of detail whose file is in its place.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -67,7 +67,17 @@ pub struct Findings {
     pub sign: SignStats,
     /// The threshold, cells, where it was raised for fewer triangles.
     raised_cells: Option<f64>,
+    /// Counts when the cells are as they stay.
+    #[serde(default)]
+    pub(crate) placed: ContourStats,
+    /// The same with those of writing.
     pub contour: ContourStats,
+    /// Whether the output has a vertex once for each attribute that its corners have.
+    #[serde(default)]
+    pub(crate) is_split: bool,
+    /// Images and maps of materials that the output does not show.
+    #[serde(default)]
+    pub(crate) lost_maps: Vec<String>,
     pub written: SinkStats,
     pub proof: Option<Proof>,
     /// The levels before the one under way.
@@ -151,6 +161,7 @@ impl Run<'_> {
             Step::Choose => self.choose(workspace, findings, handles, resources)?,
             Step::Place => self.place(workspace, findings, handles, resources)?,
             Step::Separate => self.separate(workspace, findings, handles, resources)?,
+            Step::Draw => self.draw(workspace, findings, handles, resources)?,
             Step::Write => self.write(workspace, findings, handles, resources)?,
             Step::Prove => self.prove(workspace, findings, resources)?,
         };
@@ -173,6 +184,11 @@ impl Run<'_> {
             Step::Choose => 0,
             Step::Place => findings.sign.bricks,
             Step::Separate => 0,
+            Step::Draw if self.attributes(findings).any() => 2 * findings.sign.bricks,
+            Step::Draw => 0,
+            Step::Write if self.attributes(findings).any() => {
+                findings.contour.vertices + findings.contour.triangles
+            }
             Step::Write => 2 * findings.sign.bricks,
             // Read once, and joined once.
             Step::Prove => 2 * findings.written.triangles,
@@ -187,8 +203,11 @@ impl Run<'_> {
         let options = ReadOptions { share_bytes: resources.share_bytes };
         let mut source =
             crate::io::open(self.input, resources.scratch, &options).map_err(RepairError::Input)?;
-        let soup = read_soup(&mut *source, self.settings.strict, resources)
+        let mut soup = read_soup(&mut *source, self.settings.strict, self.takes(), resources)
             .map_err(|e| RepairError::from_ingest(e, self.input))?;
+        // What the reader holds of the share is free from here on.
+        drop(source);
+        soup.part_looks(resources).map_err(RepairError::Input)?;
         self.check_unchanged()?;
         findings.soup = Some(soup.facts);
         if soup.spool.is_empty() {
@@ -211,6 +230,7 @@ impl Run<'_> {
         findings: &mut Findings,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
+        self.keep_images(workspace, findings)?;
         let soup = Soup::open(resources, &workspace.files(), *findings.soup())?;
         let (bins, measure) = fill_bins(&soup, findings.domain(), resources)?;
         findings.measure = measure;
@@ -290,7 +310,8 @@ impl Run<'_> {
             method: self.settings.method,
             crease_deg: self.settings.crease_deg,
             decimate_cells: decimate_cells.expect("refused when the grid was laid"),
-            surfaces: self.surface_detail(findings),
+            surfaces: self.drawn_detail(findings),
+            sources: self.has_sources(findings),
         }
     }
 
@@ -339,7 +360,7 @@ impl Run<'_> {
         let (surface, stats) =
             separate(signs, cells, domain, &options, &findings.contour, resources)
                 .map_err(RepairError::Contour)?;
-        findings.contour = stats;
+        (findings.placed, findings.contour) = (stats, stats);
         // Another level opens them again, unless they are in memory only.
         let more = self.has_more_levels(findings);
         handles.signs.take_if(|signs| !more || signs.state().is_some());
@@ -353,11 +374,12 @@ impl Run<'_> {
         handles: &mut Handles,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
-        let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
-        let start = WriteProgress::noted(resources);
+        let is_painted = self.attributes(findings).any();
+        // What is painted begins anew: the long part of it lies in spools.
+        let start = WriteProgress::noted(resources).filter(|_| !is_painted);
         let (part, scratch) = (workspace.part(), resources.scratch);
         let write_options = self.write_options(workspace, findings)?;
+        findings.lost_maps = self.lost_maps(&write_options, workspace)?;
         let sink = match &start {
             Some(noted) => {
                 crate::io::reopen(part, self.format, scratch, &write_options, &noted.sink)
@@ -365,17 +387,18 @@ impl Run<'_> {
             None => crate::io::create(part, self.format, scratch, &write_options),
         };
         let mut sink = sink.map_err(RepairError::Output)?;
-        let placed = (&findings.contour, start);
-        let options = self.contour_options(findings);
-        findings.contour = write_surface(
-            (cells, surface),
-            findings.domain(),
-            &options,
-            placed,
-            &mut *sink,
-            resources,
-        )
-        .map_err(RepairError::from_write)?;
+        findings.is_split = sink.corner_form() == CornerForm::OfVertices;
+        if is_painted {
+            self.paint(workspace, findings, &mut *sink, resources)?;
+        } else {
+            let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
+            let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
+            let placed = (&findings.placed, start);
+            let (domain, options) = (findings.domain(), self.contour_options(findings));
+            findings.contour =
+                write_surface((cells, surface), domain, &options, placed, &mut *sink, resources)
+                    .map_err(RepairError::from_write)?;
+        }
         (handles.cells, handles.surface) = (None, None);
         let written = sink.finish().map_err(RepairError::Output)?;
         self.recording.count(Counter::OutputBytesWritten, written.file.bytes);
@@ -403,8 +426,9 @@ impl Run<'_> {
             FillRule::Solid if !findings.has_panes() => Outward::AllPositive,
             _ => Outward::AlternatesWithNesting,
         };
-        let proof_options =
-            ProofOptions { share_bytes: resources.share_bytes / 2, outward, intersections: true };
+        let vertices = if findings.is_split { Vertices::Positions } else { Vertices::Numbers };
+        let share_bytes = resources.share_bytes / 2;
+        let proof_options = ProofOptions { share_bytes, outward, vertices, intersections: true };
         let proof =
             prove(&mut open, resources.scratch, &proof_options, resources.pool, &self.recording)
                 .map_err(RepairError::from_verify)?;

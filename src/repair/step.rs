@@ -3,12 +3,15 @@
 //! A step is what a checkpoint can say of: it is finished, and its files are there. A stage that
 //! takes long is made of several.
 
-use crate::bridge::{ADDED, ADDED_ENTRIES, LEFT_OUT};
+use crate::bridge::{ADDED, ADDED_ENTRIES, LEFT_OUT, ORIGINS, SLAB_ORIGINS};
 use crate::contour::{CELLS, SURFACE};
-use crate::ingest::{ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, PART_NAMES, SOUP};
-use crate::io::MATERIALS;
+use crate::ingest::{
+    ATTRIBUTES, BIN_ENTRIES, BINS, DROPS, LOOK_MATERIALS, LOOKS, PART_NAMES, SOUP,
+};
+use crate::io::{IMAGES, MATERIALS};
 use crate::monitor::Stage;
 use crate::octree::FLIPS;
+use crate::paint::DRAWN;
 use crate::scan::HITS;
 use crate::sign::{FLOODED, REGIONS, SIGNS};
 use crate::transfer::BORDERS;
@@ -44,6 +47,8 @@ pub enum Step {
     Place,
     /// Surfaces in one cell are kept apart.
     Separate,
+    /// The surface is drawn into spools, where it gets more than its shape.
+    Draw,
     /// The surface is written.
     Write,
     /// The written file is proved.
@@ -52,7 +57,7 @@ pub enum Step {
 
 impl Step {
     /// All steps.
-    pub const ALL: [Self; 14] = [
+    pub const ALL: [Self; 15] = [
         Self::Read,
         Self::Bin,
         Self::Settle,
@@ -65,6 +70,7 @@ impl Step {
         Self::Choose,
         Self::Place,
         Self::Separate,
+        Self::Draw,
         Self::Write,
         Self::Prove,
     ];
@@ -84,6 +90,7 @@ impl Step {
             Self::Choose => "choose",
             Self::Place => "place",
             Self::Separate => "separate",
+            Self::Draw => "draw",
             Self::Write => "write",
             Self::Prove => "prove",
         }
@@ -97,25 +104,28 @@ impl Step {
             Self::Scan => Stage::Scan,
             Self::Patch => Stage::Patch,
             Self::Flood | Self::Sign => Stage::Sign,
-            Self::Choose | Self::Place | Self::Separate | Self::Write => Stage::Contour,
+            Self::Choose | Self::Place | Self::Separate | Self::Draw | Self::Write => {
+                Stage::Contour
+            }
             Self::Prove => Stage::Verify,
         }
     }
 
-    /// The files that it leaves. `attributes.spool` is there only if the input has attributes.
+    /// The files that it leaves. Those of attributes are empty where the output gets none.
     pub const fn writes(self) -> &'static [&'static str] {
         match self {
-            Self::Read => &[SOUP, ATTRIBUTES, PART_NAMES, MATERIALS],
+            Self::Read => &[SOUP, ATTRIBUTES, LOOKS, LOOK_MATERIALS, PART_NAMES, MATERIALS, IMAGES],
             Self::Bin => &[BINS, BIN_ENTRIES],
             Self::Settle => &[DROPS],
-            Self::Mend => &[LEFT_OUT, ADDED, ADDED_ENTRIES],
+            Self::Mend => &[LEFT_OUT, ADDED, ADDED_ENTRIES, ORIGINS],
             Self::Scan => &[HITS],
             Self::Patch => &[FLIPS],
             Self::Flood => &[FLOODED, REGIONS],
-            Self::Revise => &[BORDERS],
+            Self::Revise => &[BORDERS, SLAB_ORIGINS],
             Self::Sign => &[SIGNS],
             Self::Place => &[CELLS],
             Self::Separate => &[SURFACE],
+            Self::Draw => &DRAWN,
             Self::Write => &[OUTPUT_PART],
             Self::Choose | Self::Prove => &[],
         }
@@ -125,7 +135,7 @@ impl Step {
     pub const fn reads(self) -> &'static [&'static str] {
         match self {
             Self::Read => &[],
-            Self::Bin => &[SOUP, PART_NAMES, MATERIALS],
+            Self::Bin => &[SOUP, ATTRIBUTES, LOOKS, LOOK_MATERIALS, PART_NAMES, MATERIALS, IMAGES],
             Self::Settle => &[BINS, BIN_ENTRIES],
             Self::Mend => &[BINS, BIN_ENTRIES, DROPS],
             Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
@@ -133,8 +143,12 @@ impl Step {
             Self::Flood => &[HITS, FLIPS],
             Self::Revise => &[
                 SOUP,
+                ATTRIBUTES,
+                LOOKS,
+                LOOK_MATERIALS,
                 PART_NAMES,
                 MATERIALS,
+                IMAGES,
                 BINS,
                 BIN_ENTRIES,
                 LEFT_OUT,
@@ -146,10 +160,24 @@ impl Step {
                 REGIONS,
             ],
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, BORDERS],
-            Self::Choose | Self::Place => &[SIGNS],
+            // With what later steps of every level read that is there by now.
+            Self::Choose => &[SIGNS, ATTRIBUTES, ORIGINS, SLAB_ORIGINS],
+            Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],
-            Self::Write => &[CELLS, SURFACE, MATERIALS],
-            Self::Prove => &[OUTPUT_PART, MATERIALS],
+            Self::Draw => &[CELLS, SURFACE, ORIGINS, SLAB_ORIGINS],
+            Self::Write => &[
+                CELLS,
+                SURFACE,
+                DRAWN[0],
+                DRAWN[1],
+                DRAWN[2],
+                DRAWN[3],
+                ATTRIBUTES,
+                LOOK_MATERIALS,
+                MATERIALS,
+                IMAGES,
+            ],
+            Self::Prove => &[OUTPUT_PART, LOOK_MATERIALS, MATERIALS, IMAGES],
         }
     }
 
@@ -164,7 +192,6 @@ impl Step {
         let last_reader = Self::ALL.into_iter().rfind(|step| step.reads().contains(&file));
         // Choosing leaves no file, so what the signs came from waits for the step after it.
         let finished = if self == Self::Choose { Self::Sign } else { self };
-        // Nobody reads attributes yet.
         last_reader.is_none_or(|reader| reader >= finished)
     }
 

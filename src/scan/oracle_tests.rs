@@ -7,6 +7,7 @@
 use std::collections::{BTreeMap, BTreeSet};
 
 use crate::ingest::{fill_bins, read_soup, settle};
+use crate::mesh::Attributes;
 use crate::mesh::shapes::{
     Corners, ListedTriangles, Random, crumple, cuboid, sphere, tetrahedron, torus,
 };
@@ -35,7 +36,7 @@ fn scanned<T>(soup: &[Corners], depth: u32, look: impl FnOnce(&BrickFile, &Domai
         monitor: &Void,
     };
     let mut source = ListedTriangles::without_indices(soup.to_vec());
-    let read = read_soup(&mut source, true, &resources).expect("a sound soup");
+    let read = read_soup(&mut source, true, Attributes::NONE, &resources).expect("a sound soup");
     let domain = Domain::around(&read.facts.bounds, depth, false).expect("room enough");
     let (bins, _) = fill_bins(&read, &domain, &resources).expect("room on the disk");
     let settled = settle(&bins, &domain, read.facts.stats.triangles, &resources).expect("room");

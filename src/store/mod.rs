@@ -17,6 +17,7 @@ mod pipeline;
 mod resources;
 mod scratch;
 mod scratch_file;
+mod sequence;
 mod sort;
 mod spool;
 mod table;
@@ -37,6 +38,7 @@ pub use pipeline::{Scales, ordered, ordered_by_weight};
 pub use resources::Resources;
 pub use scratch::{Scratch, sync_folder};
 pub use scratch_file::ScratchFile;
+pub use sequence::Sequence;
 pub use sort::{Record, Sorted, Sorter};
 pub use spool::{Spool, SpoolPeek, SpoolReader, SpoolWriter};
 pub use table::Table;
@@ -44,4 +46,4 @@ pub use texts::{Texts, TextsWriter};
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.
-pub const FORMAT_VERSION: u32 = 6;
+pub const FORMAT_VERSION: u32 = 7;

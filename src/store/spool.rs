@@ -300,6 +300,18 @@ impl<'s, R: Pod> SpoolPeek<'s, R> {
         Ok(self.reader.block.get(self.at).copied())
     }
 
+    /// Passes over the records before `number`, counted from the first of the spool.
+    pub fn pass_to(&mut self, number: u64) {
+        let first = self.reader.next - self.reader.block.len() as u64;
+        if number < self.reader.next {
+            self.at = self.at.max(number.saturating_sub(first) as usize);
+        } else {
+            self.reader.next = number.min(self.reader.end);
+            self.reader.block.clear();
+            self.at = 0;
+        }
+    }
+
     /// Takes the next record, `None` at the end.
     ///
     /// # Errors
@@ -423,5 +435,20 @@ mod tests {
             next += taken.len() as u32;
         }
         assert_eq!(next, 40_000);
+    }
+
+    #[test]
+    fn records_are_passed_over_within_blocks_and_across_them() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let spool = written(&scratch, 30_000);
+        let mut peek = SpoolPeek::new(&spool);
+        for number in [0, 3, 3, 8191, 8192, 8200, 25_000, 29_999] {
+            peek.pass_to(number);
+            let found = peek.peek().expect("read works").map(|record| record[0]);
+            assert_eq!(found, Some(number as u32));
+        }
+        peek.pass_to(30_000);
+        assert_eq!(peek.peek().expect("read works"), None);
     }
 }

@@ -17,11 +17,22 @@ impl Unite {
     /// # Errors
     /// More than 2^32 - 1 members, or the scratch disk fails.
     pub fn new(scratch: &Scratch, share_bytes: u64, len: u64) -> Result<Self, StoreError> {
+        Self::of(Table::new(scratch, share_bytes), len)
+    }
+
+    /// As [`Unite::new`], where members that are united lie far from each other.
+    ///
+    /// # Errors
+    /// As [`Unite::new`].
+    pub fn scattered(scratch: &Scratch, share_bytes: u64, len: u64) -> Result<Self, StoreError> {
+        Self::of(Table::scattered(scratch, share_bytes), len)
+    }
+
+    fn of(mut parents: Table<u32>, len: u64) -> Result<Self, StoreError> {
         let limit = u64::from(u32::MAX);
         if len > limit {
             return Err(StoreError::TooMany { what: "Things to unite", limit });
         }
-        let mut parents = Table::new(scratch, share_bytes);
         for member in 0..len as u32 {
             parents.push(member)?;
         }

@@ -7,9 +7,9 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::defect::Smallest;
 use crate::monitor::Monitor;
 use crate::store::{Record, Scratch, Sorter, StoreError};
-use crate::verify::places::Smallest;
 use crate::verify::positions::{PositionIndex, PositionKey, key_of};
 use crate::verify::tape::Tape;
 

@@ -13,10 +13,9 @@ use std::collections::HashMap;
 use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::Monitor;
-use crate::store::{Labels, Record, Scratch, Sorter, StoreError, Unite};
+use crate::store::{Labels, Record, Scratch, Sequence, Sorter, StoreError, Unite};
 use crate::verify::cone::{CONE_BOUND, Compensated, Cone, LEAST_VOLUME};
 use crate::verify::exact::ExactVolume;
-use crate::verify::spool::Spool;
 use crate::verify::tape::Tape;
 
 /// Not closed: no volume.
@@ -97,7 +96,7 @@ impl Body {
 pub(crate) struct Measure<'m> {
     pub(crate) tape: &'m Tape,
     pub(crate) labels: &'m mut Labels,
-    pub(crate) unbalanced: &'m Spool<u32>,
+    pub(crate) unbalanced: &'m Sequence<u32>,
     /// The number of components.
     pub(crate) count: u64,
     /// The largest absolute coordinate.
@@ -109,8 +108,8 @@ pub(crate) struct Measure<'m> {
 
 /// Components whose sign is known, and those that need exact sums.
 struct Sorting {
-    settled: Spool<Component>,
-    unsettled: Spool<Component>,
+    settled: Sequence<Component>,
+    unsettled: Sequence<Component>,
 }
 
 impl Sorting {
@@ -122,8 +121,8 @@ impl Sorting {
 
 impl Measure<'_> {
     /// Finds the side of every component.
-    pub(crate) fn components(&mut self) -> Result<Spool<Component>, StoreError> {
-        let spool = || Spool::new(self.scratch, self.share_bytes / 8);
+    pub(crate) fn components(&mut self) -> Result<Sequence<Component>, StoreError> {
+        let spool = || Sequence::new(self.scratch, self.share_bytes / 8);
         let mut sorting = Sorting { settled: spool(), unsettled: spool() };
         let body_bytes = (size_of::<Body>() + 48) as u64;
         if self.count <= self.share_bytes / 4 / body_bytes {
@@ -155,7 +154,7 @@ impl Measure<'_> {
             }
             Ok(true)
         })?;
-        each_block(self.unbalanced, 1024, |vertices| {
+        self.unbalanced.each_block(1024, |vertices| {
             for &vertex in vertices {
                 let label = labels.label(vertex)?;
                 bodies[place_of[&label]].component.side = OPEN;
@@ -176,7 +175,7 @@ impl Measure<'_> {
             }
             Ok(true)
         })?;
-        each_block(self.unbalanced, 64, |vertices| {
+        self.unbalanced.each_block(64, |vertices| {
             for &vertex in vertices {
                 let label = u64::from(labels.label(vertex)?);
                 sorter.push(Labelled { label, triangle: OPEN_MARK, corners: [[0.0; 3]; 3] })?;
@@ -207,14 +206,14 @@ impl Measure<'_> {
     /// Sums the volumes that f64 could not tell from zero, exactly.
     fn decide(
         &mut self,
-        unsettled: &Spool<Component>,
-        settled: &mut Spool<Component>,
+        unsettled: &Sequence<Component>,
+        settled: &mut Sequence<Component>,
     ) -> Result<(), StoreError> {
         // An expansion holds some forty f64, and its vector may be twice as large.
         let chunk = (self.share_bytes / 8 / 1024).max(1) as usize;
         let scale = scale_for(self.reach);
         let (tape, monitor, labels) = (self.tape, self.monitor, &mut *self.labels);
-        each_block(unsettled, chunk, |components| {
+        unsettled.each_block(chunk, |components| {
             let mut volumes: HashMap<u32, ExactVolume> =
                 components.iter().map(|c| (c.label, ExactVolume::new())).collect();
             tape.each(monitor, |triangle| {
@@ -256,20 +255,4 @@ impl Record for Labelled {
     fn key(&self) -> Self::Key {
         (self.label, self.triangle)
     }
-}
-
-/// Shows a whole spool in blocks of at most `count` records.
-pub(crate) fn each_block<R: Pod>(
-    spool: &Spool<R>,
-    count: usize,
-    mut visit: impl FnMut(&[R]) -> Result<(), StoreError>,
-) -> Result<(), StoreError> {
-    let mut start = 0;
-    let mut buffer = Vec::new();
-    while start < spool.len() {
-        let block = spool.block(start, count, &mut buffer)?;
-        start += block.len() as u64;
-        visit(block)?;
-    }
-    Ok(())
 }

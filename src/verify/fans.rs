@@ -11,10 +11,9 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::Monitor;
-use crate::store::{Record, Scratch, ScratchFile, StoreError};
+use crate::store::{Record, Scratch, ScratchFile, Sequence, StoreError};
 use crate::verify::crowd::judge_by_sorting;
 use crate::verify::link::{Judgement, Wedge};
-use crate::verify::spool::Spool;
 use crate::verify::tape::Tape;
 
 /// A wedge and its vertex.
@@ -46,7 +45,7 @@ pub(crate) fn judge_fans(
     share_bytes: u64,
     monitor: &dyn Monitor,
 ) -> Result<Judgement, StoreError> {
-    let mut judgement = Judgement::new(Spool::new(scratch, share_bytes / 16));
+    let mut judgement = Judgement::new(Sequence::new(scratch, share_bytes / 16));
     let needed = range_bytes(tape.len() * 3, space);
     if needed <= share_bytes {
         let visit = |see: &mut dyn FnMut(Corner)| {

@@ -5,14 +5,14 @@
 //! Invariant:  the degeneracy test is exact: a f64 filter with an error bound, then exact signs.
 //! Source:     Shewchuk 1997 (adaptive precision), for the filter's bound and exact signs.
 
-use crate::defect::{Defect, DegenerateTriangle, NonfiniteTriangle};
+use crate::defect::{Defect, DegenerateTriangle, MOST_PLACES, NonfiniteTriangle};
+use crate::geom::signs::{Signs, is_tame};
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::verify::cone::{Compensated, Cone};
-use crate::verify::intersect::{Intersections, Signs, is_tame};
-use crate::verify::places::MOST_PLACES;
+use crate::verify::intersect::Intersections;
 use crate::verify::tape::{Tape, is_whole, stop_if_asked};
-use crate::verify::{Proof, VerifyError};
+use crate::verify::{Proof, VerifyError, Vertices};
 
 /// What the pass found.
 #[derive(Default)]
@@ -42,6 +42,7 @@ pub(crate) fn is_finite(corners: &[[f64; 3]; 3]) -> bool {
 pub(crate) fn read<S: MeshSource + ?Sized>(
     source: &mut S,
     tape: &mut Tape,
+    vertices: Vertices,
     mut intersections: Option<&mut Intersections<'_>>,
     monitor: &dyn Monitor,
 ) -> Result<Intake, VerifyError<S::Error>> {
@@ -49,6 +50,9 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
     let mut batch = TriangleBatch::default();
     while source.next_batch(&mut batch).map_err(|source| VerifyError::Source { source })? {
         stop_if_asked(monitor)?;
+        if vertices == Vertices::Positions {
+            batch.indices.clear();
+        }
         for (at, corners) in batch.corners.iter().enumerate() {
             let ids = batch.indices.get(at).copied();
             let number = intake.triangles;
@@ -64,7 +68,8 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
         }
         monitor.advance(batch.len() as u64);
     }
-    intake.close(source.vertex_count(), source.discarded());
+    let listed = source.vertex_count().filter(|_| vertices == Vertices::Numbers);
+    intake.close(listed, source.discarded());
     Ok(intake)
 }
 

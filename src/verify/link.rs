@@ -3,9 +3,8 @@
 //! Invariant:  a vertex is good iff its records form exactly one cycle in which no neighbour occurs
 //!             twice. An edge is counted at its lower end, so once.
 
-use crate::store::StoreError;
-use crate::verify::places::Smallest;
-use crate::verify::spool::Spool;
+use crate::defect::Smallest;
+use crate::store::{Sequence, StoreError};
 
 /// Next and previous vertex of a triangle, seen from its corner at the judged vertex.
 pub(crate) type Wedge = [u32; 2];
@@ -26,7 +25,7 @@ pub(crate) struct Judgement {
     pub(crate) inconsistent_places: Smallest<[u32; 2], ()>,
     pub(crate) vertex_places: Smallest<u32, u64>,
     /// Vertices with an edge that is not used equally often in both directions.
-    pub(crate) unbalanced: Spool<u32>,
+    pub(crate) unbalanced: Sequence<u32>,
 }
 
 /// One end of a wedge: the neighbour times two, plus one if the edge runs towards the vertex.
@@ -39,7 +38,7 @@ pub(crate) fn spokes([next, previous]: Wedge) -> [Spoke; 2] {
 }
 
 impl Judgement {
-    pub(crate) fn new(unbalanced: Spool<u32>) -> Self {
+    pub(crate) fn new(unbalanced: Sequence<u32>) -> Self {
         Self {
             used_vertices: 0,
             edges: 0,

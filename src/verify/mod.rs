@@ -32,7 +32,6 @@ mod positions;
 mod proof;
 mod prover;
 mod slots;
-mod spool;
 mod stream;
 mod tape;
 #[cfg(test)]
@@ -45,7 +44,7 @@ use std::error::Error;
 
 use rayon::ThreadPool;
 
-use crate::defect::{Defect, IntersectingTriangles};
+use crate::defect::{Defect, IntersectingTriangles, Meeting};
 use crate::mesh::MeshSource;
 use crate::monitor::{Monitor, Stage};
 use crate::store::{Scratch, StoreError};
@@ -64,6 +63,16 @@ pub enum Outward {
     NotAsked,
 }
 
+/// What tells vertices apart.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Vertices {
+    /// Their numbers, in files that have any.
+    #[default]
+    Numbers,
+    /// Their positions: of files that name a vertex several times, once for each attribute.
+    Positions,
+}
+
 /// How to prove.
 #[derive(Clone, Copy, Debug)]
 pub struct ProofOptions {
@@ -71,6 +80,8 @@ pub struct ProofOptions {
     pub share_bytes: u64,
     /// What orientation is asked.
     pub outward: Outward,
+    /// What tells vertices apart.
+    pub vertices: Vertices,
     /// Whether pairs of triangles that intersect are asked.
     pub intersections: bool,
 }
@@ -126,6 +137,7 @@ pub fn prove<'s, E: Error + Send>(
             enter_intersections(intersections, &mut found, pool, monitor)?;
             let mut proof = prover.judge()?;
             proof.intersecting_pairs = found.intersecting_pairs;
+            proof.meetings = found.meetings;
             proof.places.append(&mut found.places);
             proof
         }
@@ -142,9 +154,17 @@ fn enter_intersections(
 ) -> Result<(), StoreError> {
     let Some(intersections) = intersections else { return Ok(()) };
     let found = intersections.join(pool, monitor)?;
-    proof.intersecting_pairs = found.pairs;
-    proof.places.extend(found.places.iter().map(|&(triangles, position)| {
-        Defect::IntersectingTriangles(IntersectingTriangles { triangles, position })
-    }));
+    proof.intersecting_pairs = found.pairs.total();
+    proof.meetings = found.pairs;
+    let mut places = Vec::new();
+    for (meeting, found) in Meeting::ALL.into_iter().zip(&found.places) {
+        places.extend(found.iter().map(|&(triangles, position)| IntersectingTriangles {
+            triangles,
+            position,
+            meeting,
+        }));
+    }
+    places.sort_unstable_by_key(|pair| pair.triangles);
+    proof.places.extend(places.into_iter().map(Defect::IntersectingTriangles));
     Ok(())
 }

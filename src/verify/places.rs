@@ -1,35 +1,8 @@
-//! A few offenders of each kind, the same ones for every share.
+//! Where the vertices are that have a part in defects.
 
 use crate::monitor::Monitor;
 use crate::store::StoreError;
 use crate::verify::tape::Tape;
-
-/// How many places are told of each kind of defect.
-pub(crate) const MOST_PLACES: usize = 8;
-
-/// Keeps the items with the smallest keys.
-pub(crate) struct Smallest<K: Ord + Copy, T> {
-    kept: Vec<(K, T)>,
-}
-
-impl<K: Ord + Copy, T> Smallest<K, T> {
-    pub(crate) fn new() -> Self {
-        Self { kept: Vec::with_capacity(MOST_PLACES + 1) }
-    }
-
-    pub(crate) fn offer(&mut self, key: K, item: T) {
-        if self.kept.len() == MOST_PLACES && self.kept[MOST_PLACES - 1].0 <= key {
-            return;
-        }
-        let at = self.kept.partition_point(|(k, _)| *k < key);
-        self.kept.insert(at, (key, item));
-        self.kept.truncate(MOST_PLACES);
-    }
-
-    pub(crate) fn iter(&self) -> impl Iterator<Item = &(K, T)> {
-        self.kept.iter()
-    }
-}
 
 /// Where the few vertices are that have a part in defects.
 pub(crate) struct Positions {

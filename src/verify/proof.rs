@@ -4,7 +4,7 @@ use std::fmt;
 
 use serde::{Deserialize, Serialize};
 
-use crate::defect::{Defect, DefectKind};
+use crate::defect::{Defect, DefectKind, MeetingCounts};
 
 /// The counts of one file, and whether they are what is guaranteed.
 ///
@@ -48,13 +48,15 @@ pub struct Proof {
     /// Pairs of triangles with an area that meet anywhere but in vertices and edges that they
     /// share; touching counts. 0 when not asked.
     pub intersecting_pairs: u64,
+    /// The same, by how they meet.
+    pub meetings: MeetingCounts,
     /// Signed volume in cubed model units, rounded; means nothing unless closed.
     pub volume: f64,
     /// Area in squared model units, rounded.
     pub area: f64,
     /// Lowest and highest corner of the triangles with finite corners.
     pub bounds: Option<[[f64; 3]; 2]>,
-    /// The first eight defects of each kind.
+    /// The first eight defects of each kind; of pairs that meet, of each way to meet.
     pub places: Vec<Defect>,
 }
 
@@ -89,7 +91,7 @@ impl fmt::Display for Failure {
 }
 
 impl Proof {
-    /// How many defects of a kind there are.
+    /// How many defects of a kind there are; 0 for those that only a diagnosis looks for.
     #[must_use]
     pub fn count(&self, kind: DefectKind) -> u64 {
         match kind {
@@ -102,6 +104,8 @@ impl Proof {
             DefectKind::CoincidentVertices => self.coincident_vertices,
             DefectKind::InwardComponent => self.inward_components,
             DefectKind::IntersectingTriangles => self.intersecting_pairs,
+            // The proof does not look for these, or has them among others.
+            _ => 0,
         }
     }
 

@@ -2,30 +2,30 @@
 
 use crate::defect::{
     BoundaryEdge, CoincidentVertices, Defect, EdgePlace, InconsistentEdge, InwardComponent,
-    NonmanifoldEdge, NonmanifoldVertex, VertexPlace,
+    NonmanifoldEdge, NonmanifoldVertex, Smallest, VertexPlace,
 };
 use crate::mesh::MeshSource;
 use crate::monitor::Monitor;
-use crate::store::{Labels, Scratch, StoreError};
+use crate::store::{Labels, Scratch, Sequence, StoreError};
 use crate::verify::coincidence::find_coincident;
-use crate::verify::components::{Component, Measure, OPEN, UNDECIDED, each_block, unite};
+use crate::verify::components::{Component, Measure, OPEN, UNDECIDED, unite};
 use crate::verify::fans::judge_fans;
 use crate::verify::intake::{Intake, read};
 use crate::verify::intersect::Intersections;
 use crate::verify::link::Judgement;
 use crate::verify::nesting::{Nesting, nest};
 use crate::verify::numbering::number_positions;
-use crate::verify::places::{Positions, Smallest};
+use crate::verify::places::Positions;
 use crate::verify::positions::position_of;
-use crate::verify::spool::Spool;
 use crate::verify::tape::Tape;
-use crate::verify::{Outward, Proof, ProofOptions, VerifyError};
+use crate::verify::{Outward, Proof, ProofOptions, VerifyError, Vertices};
 
 /// One proof under way.
 pub(crate) struct Prover<'p> {
     scratch: &'p Scratch,
     quarter_bytes: u64,
     outward: Outward,
+    vertices: Vertices,
     monitor: &'p dyn Monitor,
     tape: Tape,
     intake: Intake,
@@ -44,6 +44,7 @@ impl<'p> Prover<'p> {
             scratch,
             quarter_bytes,
             outward: options.outward,
+            vertices: options.vertices,
             monitor,
             tape: Tape::new(scratch, quarter_bytes),
             intake: Intake::default(),
@@ -57,7 +58,7 @@ impl<'p> Prover<'p> {
         source: &mut S,
         intersections: Option<&mut Intersections<'_>>,
     ) -> Result<(), VerifyError<S::Error>> {
-        self.intake = read(source, &mut self.tape, intersections, self.monitor)?;
+        self.intake = read(source, &mut self.tape, self.vertices, intersections, self.monitor)?;
         Ok(())
     }
 
@@ -159,7 +160,7 @@ impl<'p> Prover<'p> {
     fn enter_orientation(
         &mut self,
         labels: &mut Labels,
-        unbalanced: &Spool<u32>,
+        unbalanced: &Sequence<u32>,
     ) -> Result<(), StoreError> {
         let [low, high] = self.proof.bounds.unwrap_or_default();
         let reach = low.iter().chain(&high).fold(0.0_f64, |most, x| most.max(x.abs()));
@@ -179,7 +180,7 @@ impl<'p> Prover<'p> {
             (&self.tape, self.monitor, self.outward == Outward::AlternatesWithNesting);
         let (mut inward, mut undecided) = (0, 0);
         let mut places = Smallest::new();
-        each_block(&components, chunk, |components| {
+        components.each_block(chunk, |components| {
             let nestings = if nested && self.proof.components > 1 {
                 nest(components, tape, labels, monitor)?
             } else {

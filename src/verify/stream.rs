@@ -15,7 +15,7 @@ use crate::verify::positions::{PositionKey, key_of};
 use crate::verify::slots::Name;
 use crate::verify::tape::stop_if_asked;
 use crate::verify::window::{Sound, Window};
-use crate::verify::{Outward, Proof, ProofOptions, VerifyError};
+use crate::verify::{Outward, Proof, ProofOptions, VerifyError, Vertices};
 
 /// Beyond this, the products of tiny and huge coordinates need a closer look.
 const MOST_REACH: f64 = 1.0e30;
@@ -39,6 +39,9 @@ pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
     let mut batch = TriangleBatch::default();
     while source.next_batch(&mut batch).map_err(|source| VerifyError::Source { source })? {
         stop_if_asked(monitor)?;
+        if options.vertices == Vertices::Positions {
+            batch.indices.clear();
+        }
         let windows = windows.get_or_insert_with(|| {
             if batch.indices.is_empty() {
                 Windows::Positions(Window::new(scratch, options.share_bytes))
@@ -62,7 +65,8 @@ pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
         }
         monitor.advance(batch.len() as u64);
     }
-    intake.close(source.vertex_count(), source.discarded());
+    let listed = source.vertex_count().filter(|_| options.vertices == Vertices::Numbers);
+    intake.close(listed, source.discarded());
     let sound = match windows {
         None => None,
         Some(Windows::Numbers(window)) => window.finish()?,

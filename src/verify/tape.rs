@@ -6,8 +6,7 @@
 //! Memory:     its shares, and a read buffer of at most an eighth of them.
 
 use crate::monitor::Monitor;
-use crate::store::{Scratch, StoreError};
-use crate::verify::spool::Spool;
+use crate::store::{Scratch, Sequence, StoreError};
 
 /// A triangle on the tape.
 #[derive(Clone, Copy)]
@@ -35,8 +34,8 @@ pub(crate) fn is_whole([a, b, c]: [u32; 3]) -> bool {
 
 /// All triangles of the file, to be read again and again.
 pub(crate) struct Tape {
-    ids: Spool<[u32; 3]>,
-    corners: Spool<[[f64; 3]; 3]>,
+    ids: Sequence<[u32; 3]>,
+    corners: Sequence<[[f64; 3]; 3]>,
     block_triangles: usize,
 }
 
@@ -45,8 +44,8 @@ impl Tape {
     pub(crate) fn new(scratch: &Scratch, share_bytes: u64) -> Self {
         let block_triangles = (share_bytes / 8 / 84).clamp(16, 4096) as usize;
         Self {
-            ids: Spool::new(scratch, share_bytes / 7),
-            corners: Spool::new(scratch, share_bytes / 7 * 6),
+            ids: Sequence::new(scratch, share_bytes / 7),
+            corners: Sequence::new(scratch, share_bytes / 7 * 6),
             block_triangles,
         }
     }

@@ -12,7 +12,7 @@ use crate::monitor::Void;
 use crate::store::Scratch;
 use crate::verify::prover::Prover;
 use crate::verify::stream::prove_sound;
-use crate::verify::{Failure, Outward, Proof, ProofOptions, ProvedSource, prove};
+use crate::verify::{Failure, Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
 
 #[derive(Clone, Default)]
 struct Solid {
@@ -126,7 +126,8 @@ fn proof(solid: &Solid, indexed: bool, outward: Outward, share_bytes: u64) -> (P
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
     let mut open = || Ok(Box::new(Memory { solid, indexed, next: 0 }) as ProvedSource<'_, _>);
-    let options = ProofOptions { share_bytes, outward, intersections: false };
+    let options =
+        ProofOptions { share_bytes, outward, vertices: Vertices::Numbers, intersections: false };
     let proof =
         prove(&mut open, &scratch, &options, &pool(1), &Void).expect("nothing fails in memory");
     (proof, scratch.written_bytes())
@@ -330,8 +331,12 @@ fn a_sound_surface_has_the_same_proof_in_one_pass_and_from_the_tape() {
     many.triangles.sort_unstable_by_key(|t| t.map(|id| id.wrapping_mul(0x9E37_79B9)));
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
-    let options =
-        ProofOptions { share_bytes: 8 << 20, outward: Outward::AllPositive, intersections: false };
+    let options = ProofOptions {
+        share_bytes: 8 << 20,
+        outward: Outward::AllPositive,
+        vertices: Vertices::Numbers,
+        intersections: false,
+    };
     for indexed in [true, false] {
         let source = || Memory { solid: &many, indexed, next: 0 };
         let at_once =
@@ -359,8 +364,12 @@ fn a_request_to_stop_is_heard() {
     let solid = unit_cube();
     let source = || Box::new(Memory { solid: &solid, indexed: true, next: 0 });
     let mut open = || Ok(source() as ProvedSource<'_, _>);
-    let options =
-        ProofOptions { share_bytes: 1 << 20, outward: Outward::NotAsked, intersections: true };
+    let options = ProofOptions {
+        share_bytes: 1 << 20,
+        outward: Outward::NotAsked,
+        vertices: Vertices::Numbers,
+        intersections: true,
+    };
     let answer = prove(&mut open, &Scratch::new(folder.path()), &options, &pool(1), &Impatient);
     assert!(matches!(
         answer,

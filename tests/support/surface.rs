@@ -8,7 +8,7 @@ use brickmend::mesh::TriangleBatch;
 use brickmend::monitor::Void;
 use brickmend::sign::FillRule;
 use brickmend::store::Scratch;
-use brickmend::verify::{Outward, Proof, ProofOptions, ProvedSource, prove};
+use brickmend::verify::{Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
 use glam::DVec3;
 use tempfile::TempDir;
 
@@ -31,7 +31,11 @@ impl Surface {
             FillRule::Solid => Outward::AllPositive,
             FillRule::Nonzero | FillRule::Evenodd => Outward::AlternatesWithNesting,
         };
-        let options = ProofOptions { share_bytes: 16 << 20, outward, intersections: true };
+        // Seams and creases split the vertices of GLB.
+        let is_split = path.extension().is_some_and(|extension| extension == "glb");
+        let vertices = if is_split { Vertices::Positions } else { Vertices::Numbers };
+        let options =
+            ProofOptions { share_bytes: 16 << 20, outward, vertices, intersections: true };
         let read = ReadOptions { share_bytes: 16 << 20 };
         let mut open = || -> Result<ProvedSource<_>, brickmend::io::IoError> {
             brickmend::io::open(path, &scratch, &read)

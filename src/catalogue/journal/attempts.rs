@@ -81,7 +81,8 @@ impl Journal {
         (memory_bytes, threads): (u64, usize),
         now_ms: u64,
     ) -> Result<i64, CatalogueError> {
-        let insert = "INSERT INTO attempt (model_id, run_id, rung, memory_bytes, threads, started_ms)
+        let insert =
+            "INSERT INTO attempt (model_id, run_id, rung, memory_bytes, threads, started_ms)
             VALUES (?1, ?2, ?3, ?4, ?5, ?6)";
         self.with(|connection| {
             let (memory, threads, now) = (memory_bytes as i64, threads as i64, now_ms as i64);

@@ -83,7 +83,7 @@ impl Journal {
         self.connection.pragma_update(None, "synchronous", "NORMAL")?;
         self.connection.pragma_update(None, "foreign_keys", true)?;
         let tables = "SELECT count(*) FROM sqlite_master WHERE name = 'meta'";
-        let begun: u64 = self.connection.query_row(tables, (), |row| row.get(0))?;
+        let begun: i64 = self.connection.query_row(tables, (), |row| row.get(0))?;
         if begun > 0 {
             return Ok(());
         }

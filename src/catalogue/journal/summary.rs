@@ -105,7 +105,8 @@ impl Journal {
     /// The journal cannot be read.
     pub fn summary(&mut self) -> Result<Summary, CatalogueError> {
         let (states, under_way, failures) = (self.states()?, self.under_way()?, self.failures()?);
-        let last = "SELECT id, started_ms, ended_ms, ending, found FROM run ORDER BY id DESC LIMIT 1";
+        let last =
+            "SELECT id, started_ms, ended_ms, ending, found FROM run ORDER BY id DESC LIMIT 1";
         let ahead = "SELECT coalesce(sum(predicted_seconds), 0) FROM model WHERE state = 'pending'";
         let pace = "SELECT sum(seconds) / sum(predicted_seconds) FROM model
             WHERE state IN ('repaired', 'degraded') AND predicted_seconds > 0";
@@ -148,7 +149,8 @@ impl Journal {
     }
 
     fn under_way(&mut self) -> Result<Vec<UnderWay>, CatalogueError> {
-        let asked = "SELECT name, rung, started_ms, memory_bytes FROM under_way ORDER BY started_ms";
+        let asked =
+            "SELECT name, rung, started_ms, memory_bytes FROM under_way ORDER BY started_ms";
         self.with(|connection| {
             let mut asked = connection.prepare(asked)?;
             let rows = asked.query_map((), |row| {
@@ -164,7 +166,8 @@ impl Journal {
     }
 
     fn failures(&mut self) -> Result<Vec<Failure>, CatalogueError> {
-        let asked = "SELECT name, coalesce(cause, ''), coalesce(reason, '') FROM failures LIMIT 100";
+        let asked =
+            "SELECT name, coalesce(cause, ''), coalesce(reason, '') FROM failures LIMIT 100";
         self.with(|connection| {
             let mut asked = connection.prepare(asked)?;
             let rows = asked.query_map((), |row| {

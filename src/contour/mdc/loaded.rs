@@ -33,6 +33,8 @@ pub struct Loaded {
     pub offsets: Vec<u16>,
     /// What those crossings are, as in the record.
     pub surfaces: Vec<u32>,
+    /// Their source triangles, likewise.
+    pub sources: Vec<u32>,
     /// Keys and numbers of the vertices on faces.
     pub points: Vec<(u64, u32)>,
     /// Their positions, as those of vertices.
@@ -193,7 +195,11 @@ impl Loaded {
             if record.surfaces.len() > 1 && record.surfaces.len() != record.offsets.len() {
                 return Err(wrong("a surface for every own edge"));
             }
+            if record.sources.len() > 1 && record.sources.len() != record.offsets.len() {
+                return Err(wrong("a source for every own edge"));
+            }
             loaded.surfaces.extend(record.surfaces.iter().map(|surface| surface.to_native()));
+            loaded.sources.extend(record.sources.iter().map(|source| source.to_native()));
         }
         let first = record.positions.len() as u32;
         for (number, point) in (first..).zip(record.points.iter()) {
@@ -211,6 +217,7 @@ impl Loaded {
             offset_firsts: Vec::with_capacity(cells),
             offsets: Vec::with_capacity(cells + cells / 2),
             surfaces: Vec::new(),
+            sources: Vec::new(),
             points: Vec::new(),
             point_positions: Vec::new(),
         }
@@ -221,6 +228,13 @@ impl Loaded {
     pub fn surface(&self, offset: usize) -> Option<Surface> {
         let known = if self.surfaces.len() > 1 { offset } else { 0 };
         self.surfaces.get(known).map(|bits| Surface::from_bits(*bits))
+    }
+
+    /// The source triangle of a crossing, likewise.
+    #[inline]
+    pub fn source(&self, offset: usize) -> Option<u32> {
+        let known = if self.sources.len() > 1 { offset } else { 0 };
+        self.sources.get(known).copied()
     }
 
     /// The vertex on a face, if there is one.

@@ -8,11 +8,11 @@ use crate::contour::mdc::arcs::Edge;
 use crate::contour::mdc::around_edge::Polygon;
 use crate::contour::mdc::cell::{cell_mask, cell_number, place_of};
 use crate::contour::mdc::layers::Layers;
-use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};
+use crate::contour::mdc::neighbourhood::{Neighbourhood, OWN, Patch};
 use crate::contour::mdc::shape::{Loop, LoopPoint, Shape};
 use crate::contour::mdc::triangulate::{Cut, Quad};
 use crate::contour::{ContourError, ContourStats};
-use crate::mesh::Surface;
+use crate::mesh::{InnerCrossing, Surface};
 use crate::octree::Domain;
 
 /// The triangles of one brick.
@@ -24,6 +24,10 @@ pub struct BrickTriangles {
     pub corners: Vec<[[f64; 3]; 3]>,
     /// What they are; empty where nothing is told.
     pub surfaces: Vec<Surface>,
+    /// The source triangles that they come from; likewise.
+    pub sources: Vec<u32>,
+    /// Crossings without a triangle; likewise.
+    pub inner: Vec<InnerCrossing>,
     /// Fan points in model units.
     pub fan_points: Vec<[f64; 3]>,
     /// Counts.
@@ -114,14 +118,22 @@ impl<'p> Polygons<'p> {
                 }
                 let own = self.nb.own();
                 let (offset, surface) = (own.offsets[next_offset], own.surface(next_offset));
+                let source = own.source(next_offset);
                 next_offset += 1;
                 if (inner | 1 << axis) == 7 {
+                    let vertex = own.vertices[own.firsts[rank] as usize];
+                    self.add_inner(&[Patch { slot: OWN, vertex }], surface.zip(source), &mut out);
                     continue;
                 }
                 let edge = Edge { axis, lower: at.map(|c| c as i32) };
-                self.draw(edge, offset, mask & 1 == 1, &mut out)?;
+                if let Some(ring) = self.draw(edge, offset, mask & 1 == 1, &mut out)? {
+                    self.add_inner(&ring, surface.zip(source), &mut out);
+                }
                 if let Some(surface) = surface {
                     out.surfaces.resize(out.indices.len(), surface);
+                }
+                if let Some(source) = source {
+                    out.sources.resize(out.indices.len(), source);
                 }
             }
         }
@@ -129,7 +141,22 @@ impl<'p> Polygons<'p> {
         Ok(out)
     }
 
-    /// Draws the polygon around an edge.
+    /// Adds a crossing that has no polygon to the vertices around it, if it is told what it is.
+    fn add_inner(&self, around: &[Patch], told: Option<(Surface, u32)>, out: &mut BrickTriangles) {
+        let Some((surface, source)) = told else { return };
+        for patch in around {
+            let Corner { number: vertex, position } = self.corner(patch);
+            let is_known = out.inner.last().is_some_and(|last| {
+                (last.vertex, last.surface, last.source) == (vertex, surface, source)
+            });
+            if !is_known {
+                let position = self.nb.to_model(position);
+                out.inner.push(InnerCrossing { vertex, position, surface, source });
+            }
+        }
+    }
+
+    /// Draws the polygon around an edge; what is around it where there is none.
     #[inline]
     fn draw(
         &mut self,
@@ -137,7 +164,7 @@ impl<'p> Polygons<'p> {
         offset: u16,
         inside_below: bool,
         out: &mut BrickTriangles,
-    ) -> Result<(), ContourError> {
+    ) -> Result<Option<[Patch; 4]>, ContourError> {
         let ring = edge.ring(&mut self.nb)?;
         let crossing = self.nb.crossing_at(edge.axis, edge.lower, offset);
         if ring.iter().all(|patch| patch.vertex.cut.is_plain()) {
@@ -152,11 +179,12 @@ impl<'p> Polygons<'p> {
                 Cut::SecondFourth => self.add(&[[q, r, s], [q, s, p]], inside_below, out),
                 Cut::Fan => self.add_fan(&[p, q, r, s], crossing, inside_below, out),
             }
-            return Ok(());
+            return Ok(None);
         }
-        let Some(polygon) = Polygon::of_ring(edge, ring) else { return Ok(()) };
+        let Some(polygon) = Polygon::of_ring(edge, ring) else { return Ok(Some(ring)) };
         out.stats.polygons += 1;
-        self.draw_among_cells(&polygon, crossing, inside_below, out)
+        self.draw_among_cells(&polygon, crossing, inside_below, out)?;
+        Ok(None)
     }
 
     /// Draws a polygon between cells of any size.

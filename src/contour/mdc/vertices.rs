@@ -19,8 +19,8 @@ use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method, 
 use crate::geom::qef::QefOptions;
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedSignBrick, Border, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, PATCH,
-    ROWS, RecordBytes, SIDE, SourcePlane, decode_signs, edge_position, encode, surface_of,
+    ArchivedSignBrick, Border, BrickKey, CellBrick, CornerBits, Domain, EdgeBits, LINES, NO_SOURCE,
+    PATCH, ROWS, RecordBytes, SIDE, SourcePlane, decode_signs, edge_position, encode, surface_of,
 };
 use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
@@ -84,6 +84,8 @@ pub struct EdgeCrossing {
     pub normal: u32,
     /// What it is, for the output; [`NO_SURFACE`] on patches until their rims tell.
     pub surface: u32,
+    /// Its source triangle; likewise.
+    pub source: u32,
 }
 
 /// In [`EdgeCrossing::surface`]: not known.
@@ -125,6 +127,7 @@ pub struct Workspace {
     row_starts: Vec<u32>,
     crossings: Vec<EdgeCrossing>,
     pub(super) surfaces: SurfaceDetail,
+    sources: bool,
     patches: PatchSurfaces,
     /// Where materials may meet, by ascending cell.
     pub(super) borders: Vec<Border>,
@@ -170,6 +173,7 @@ impl Workspace {
             row_starts: vec![0; 3 * ROWS],
             crossings: Vec::new(),
             surfaces: options.surfaces,
+            sources: options.sources,
             patches: PatchSurfaces::default(),
             borders: Vec::new(),
             planes: Vec::new(),
@@ -223,8 +227,10 @@ impl Workspace {
             brick.drop_covered_reaches();
             brick.summary = clustering.summary(&brick, &self.leaves);
         }
-        if brick.surfaces.iter().all(|surface| *surface == brick.surfaces[0]) {
-            brick.surfaces.truncate(1);
+        for list in [&mut brick.surfaces, &mut brick.sources] {
+            if list.iter().all(|one| *one == list[0]) {
+                list.truncate(1);
+            }
         }
         stats.crossed_edges += brick.offsets.len() as u64;
         stats.clusters += brick.clusters.len() as u64;
@@ -258,12 +264,13 @@ impl Workspace {
             self.crossings.push(if plane & PATCH == 0 {
                 let (axis, at) = edge_position(edge);
                 let offset = self.planes[plane as usize].offset_on_edge(axis, at, cell_units);
-                let surface = surface_of(self.planes[plane as usize].material).bits();
-                EdgeCrossing { offset, normal: plane + 1, surface }
+                let SourcePlane { material, source, .. } = self.planes[plane as usize];
+                let surface = surface_of(material).bits();
+                EdgeCrossing { offset, normal: plane + 1, surface, source }
             } else {
                 let offset = f64::from(plane & 0xffff) / 65536.0;
                 has_patches = true;
-                EdgeCrossing { offset, normal: 0, surface: NO_SURFACE }
+                EdgeCrossing { offset, normal: 0, surface: NO_SURFACE, source: NO_SOURCE }
             });
         }
         self.row_starts[row..].fill(self.crossings.len() as u32);
@@ -354,10 +361,13 @@ impl Workspace {
         }
         for axis in 0..3 {
             if (mask ^ mask >> (1 << axis)) & 1 == 1 {
-                let EdgeCrossing { offset, surface, .. } = self.crossing(axis, at);
+                let EdgeCrossing { offset, surface, source, .. } = self.crossing(axis, at);
                 brick.offsets.push((offset * 65536.0).clamp(1.0, 65535.0) as u16);
                 if self.surfaces != SurfaceDetail::None {
                     brick.surfaces.push(self.surfaces.of(surface));
+                }
+                if self.sources {
+                    brick.sources.push(source);
                 }
             }
         }

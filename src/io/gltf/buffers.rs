@@ -74,6 +74,10 @@ impl Buffers {
         number: u32,
     ) -> Result<BufferRecord, IoError> {
         let mut record = model.buffer(number)?;
+        if record.origin == origin::COMPRESSED {
+            let found = "none: it is for the extension meshopt_compression, which is not read";
+            return Err(model.wrong(("buffer", number), "an address or a chunk", found));
+        }
         if record.origin != origin::UNKNOWN {
             return Ok(record);
         }
@@ -204,7 +208,7 @@ impl Buffers {
 }
 
 /// An address with its percent signs resolved.
-fn unescaped(uri: &str) -> Vec<u8> {
+pub(crate) fn unescaped(uri: &str) -> Vec<u8> {
     let mut bytes = Vec::with_capacity(uri.len());
     let mut rest = uri.as_bytes();
     while let [first, after @ ..] = rest {

@@ -35,7 +35,7 @@ pub(crate) fn decode(
     buffers: &mut Buffers,
     number: u64,
 ) -> Result<Decoded, IoError> {
-    let mut record = model.primitives.get(number)?;
+    let mut record = model.primitive(number)?;
     let points = model.accessor(record.position)?.count;
     let mut packed_bytes = 0;
     if record.decoded == NONE {

@@ -11,8 +11,8 @@ use serde::de::{
 use crate::io::error::{IoError, Place};
 use crate::io::gltf::materials;
 use crate::io::gltf::model::{
-    AccessorRecord, BufferRecord, MeshRecord, Model, NONE, NodeRecord, PrimitiveRecord, ViewRecord,
-    origin,
+    AccessorRecord, BufferRecord, ImageRecord, MeshRecord, Model, NONE, NodeRecord,
+    PrimitiveRecord, ViewRecord, origin,
 };
 use crate::io::gltf::schema::{
     Accessor, Asset, Attributes, Buffer, BufferView, Image, Material, Mesh, Node, Primitive, Scene,
@@ -187,7 +187,9 @@ fn check_extension(model: &mut Model, name: String) -> Result<(), IoError> {
 fn add_buffer(model: &mut Model, buffer: Buffer) -> Result<(), IoError> {
     let uri = model.text(buffer.uri.as_deref())?;
     let length = buffer.byte_length;
-    let record = BufferRecord { length, start: 0, uri, origin: origin::UNKNOWN };
+    let is_bare = buffer.uri.is_none() && buffer.extensions.meshopt.is_some();
+    let origin = if is_bare { origin::COMPRESSED } else { origin::UNKNOWN };
+    let record = BufferRecord { length, start: 0, uri, origin };
     Ok(model.buffers.push(record)?)
 }
 
@@ -242,18 +244,20 @@ fn add_mesh(model: &mut Model, mesh: Mesh) -> Result<(), IoError> {
 
 fn add_primitive(model: &mut Model, primitive: Primitive) -> Result<(), IoError> {
     let or_none = |number: Option<u32>| number.unwrap_or(NONE);
-    let Attributes { position, uv, colour } = primitive.attributes;
+    let Attributes { position, uv, second_uv, colour, normal } = primitive.attributes;
     let record = PrimitiveRecord {
         // Triangles, where nothing is said.
         mode: primitive.mode.unwrap_or(4),
         position: or_none(position),
         indices: or_none(primitive.indices),
         uv: or_none(uv),
+        second_uv: or_none(second_uv),
         colour: or_none(colour),
         material: or_none(primitive.material),
         draco_view: NONE,
         draco_position: NONE,
         draco_uv: NONE,
+        draco_second_uv: NONE,
         draco_colour: NONE,
         decoded: NONE,
         decoded_faces: 0,
@@ -264,13 +268,15 @@ fn add_primitive(model: &mut Model, primitive: Primitive) -> Result<(), IoError>
             draco_view: draco.buffer_view,
             draco_position: or_none(draco.attributes.position),
             draco_uv: or_none(draco.attributes.uv),
+            draco_second_uv: or_none(draco.attributes.second_uv),
             draco_colour: or_none(draco.attributes.colour),
             ..record
         },
     };
     let has_triangles = is_triangles(record.mode) && position.is_some();
-    model.has_uvs |= has_triangles && uv.is_some();
+    model.has_uvs |= has_triangles && uv.or(second_uv).is_some();
     model.has_colours |= has_triangles && colour.is_some();
+    model.has_normals |= has_triangles && normal.is_some();
     Ok(model.primitives.push(record)?)
 }
 
@@ -323,6 +329,8 @@ fn add_texture(model: &mut Model, texture: Texture) -> Result<(), IoError> {
 }
 
 fn add_image(model: &mut Model, image: Image) -> Result<(), IoError> {
-    let uri = model.text(image.uri.as_deref().filter(|uri| !uri.starts_with("data:")))?;
-    Ok(model.images.push(uri)?)
+    let uri = model.text(image.uri.as_deref())?;
+    let name = model.text(image.name.as_deref())?;
+    let view = image.buffer_view.unwrap_or(NONE);
+    Ok(model.images.push(ImageRecord { uri, view, name })?)
 }

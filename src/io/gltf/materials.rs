@@ -3,9 +3,12 @@
 use bytemuck::Zeroable;
 
 use crate::io::error::IoError;
+use crate::io::gltf::buffers::unescaped;
 use crate::io::gltf::model::{MaterialRecord, Model, NONE};
 use crate::io::gltf::schema::Material as Stated;
-use crate::mesh::Material;
+use crate::io::gltf::schema::TextureInfo;
+use crate::io::gltf::text::DATA_MARK;
+use crate::mesh::{Image, Material, OtherMaps, Texture};
 
 const TRANSPARENT: u32 = 1;
 const HAS_BASE: u32 = 2;
@@ -13,31 +16,55 @@ const HAS_EMISSIVE: u32 = 4;
 const HAS_METALLIC: u32 = 8;
 const HAS_ROUGHNESS: u32 = 16;
 const BLENDS: u32 = 32;
+const HAS_CUTOFF: u32 = 64;
+/// Where images are cut off, if it is not stated.
+const CUTOFF: f32 = 0.5;
+/// Where the set of further maps begins among the flags.
+const MAPS_SHIFT: u32 = 8;
+
+/// Texture coordinates as they are.
+pub(crate) const UV_IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
 
 /// What is stated; the texture by its number.
 pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
     let pbr = &material.pbr_metallic_roughness;
     let extensions = &material.extensions;
     let blends = material.alpha_mode.as_deref() == Some("BLEND");
+    let cuts = material.alpha_mode.as_deref() == Some("MASK");
     let transmits = extensions.transmission.as_ref().is_some_and(|t| t.transmission_factor > 0.0);
     let strength = extensions.emissive_strength.as_ref().and_then(|e| e.emissive_strength);
     let flags = [
         (blends || transmits, TRANSPARENT),
         (blends, BLENDS),
         (pbr.base_color_factor.is_some(), HAS_BASE),
-        (material.emissive_factor.is_some(), HAS_EMISSIVE),
-        // What is not stated is one, which other formats do not know.
-        (true, HAS_METALLIC),
-        (true, HAS_ROUGHNESS),
+        (material.emissive_factor.is_some() && material.emissive_texture.is_none(), HAS_EMISSIVE),
+        (cuts, HAS_CUTOFF),
+        // What is not stated is one, which other formats do not know. Factors of a map mean nothing
+        // without it.
+        (pbr.metallic_roughness_texture.is_none(), HAS_METALLIC),
+        (pbr.metallic_roughness_texture.is_none(), HAS_ROUGHNESS),
     ];
+    let maps = [
+        (material.normal_texture.is_some(), OtherMaps::NORMAL),
+        (pbr.metallic_roughness_texture.is_some(), OtherMaps::GLOSS),
+        (material.emissive_texture.is_some(), OtherMaps::EMISSION),
+        (material.occlusion_texture.is_some(), OtherMaps::OCCLUSION),
+    ];
+    let maps = maps.iter().filter(|(has, _)| *has);
+    let maps = maps.fold(OtherMaps::default(), |all, (_, map)| all.with(*map));
+    let (uv_set, uv_map) = pbr.base_color_texture.as_ref().map_or((0, UV_IDENTITY), uv_map);
     let emissive = material.emissive_factor.unwrap_or_default();
+    let flags: u32 = flags.iter().map(|&(has, flag)| if has { flag } else { 0 }).sum();
     MaterialRecord {
         name,
-        flags: flags.iter().map(|&(has, flag)| if has { flag } else { 0 }).sum(),
+        flags: flags | u32::from(maps.bits()) << MAPS_SHIFT,
+        uv_set,
+        uv_map,
         base: pbr.base_color_factor.unwrap_or([1.0; 4]),
         emissive: emissive.map(|channel| channel * strength.unwrap_or(1.0)),
         metallic: pbr.metallic_factor.unwrap_or(1.0),
         roughness: pbr.roughness_factor.unwrap_or(1.0),
+        alpha_cutoff: material.alpha_cutoff.unwrap_or(CUTOFF),
         texture: pbr.base_color_texture.as_ref().map_or(NONE, |texture| texture.index),
         ..MaterialRecord::zeroed()
     }
@@ -61,19 +88,49 @@ pub(crate) fn material(model: &mut Model, number: u32) -> Result<Material, IoErr
         emissive: has(HAS_EMISSIVE).then_some(record.emissive).filter(is_finite),
         metallic: has(HAS_METALLIC).then_some(record.metallic).filter(|x| x.is_finite()),
         roughness: has(HAS_ROUGHNESS).then_some(record.roughness).filter(|x| x.is_finite()),
+        alpha_cutoff: has(HAS_CUTOFF).then_some(record.alpha_cutoff).filter(|x| x.is_finite()),
         texture: image_of(model, record.texture)?,
+        other_maps: OtherMaps::from_bits((record.flags >> MAPS_SHIFT) as u8),
     })
 }
 
-/// The address of a texture's image, if it is a file.
-fn image_of(model: &mut Model, texture: u32) -> Result<Option<String>, IoError> {
+/// Which texture coordinates a texture takes, and how they are mapped.
+fn uv_map(texture: &TextureInfo) -> (u32, [[f32; 3]; 2]) {
+    let Some(transform) = &texture.extensions.transform else {
+        return (texture.tex_coord, UV_IDENTITY);
+    };
+    let (sin, cos) = transform.rotation.sin_cos();
+    let ([x, y], [along_u, along_v]) = (transform.offset, transform.scale);
+    let map = [[cos * along_u, sin * along_v, x], [-sin * along_u, cos * along_v, y]];
+    (transform.tex_coord.unwrap_or(texture.tex_coord), map)
+}
+
+/// A texture coordinate of the file, in whose images v goes down, as we have it: up.
+#[inline]
+pub(crate) fn mapped(map: &[[f32; 3]; 2], [u, v]: [f32; 2]) -> [f32; 2] {
+    let [u, v] = match *map {
+        UV_IDENTITY => [u, v],
+        _ => map.map(|[along_u, along_v, offset]| along_u * u + along_v * v + offset),
+    };
+    [u, 1.0 - v]
+}
+
+/// The image of a texture, if it has one.
+fn image_of(model: &mut Model, texture: u32) -> Result<Option<Texture>, IoError> {
     if u64::from(texture) >= model.textures.len() {
         return Ok(None);
     }
-    let image = model.textures.get(texture.into())?;
-    if u64::from(image) >= model.images.len() {
+    let number = model.textures.get(texture.into())?;
+    if u64::from(number) >= model.images.len() {
         return Ok(None);
     }
-    let uri = model.images.get(image.into())?;
-    model.text_of(uri)
+    let image = model.images.get(number.into())?;
+    if let Some(uri) = model.text_of(image.uri)?
+        && !uri.starts_with(DATA_MARK)
+    {
+        let path = String::from_utf8_lossy(&unescaped(&uri)).into_owned();
+        return Ok(Some(Texture::Beside(path)));
+    }
+    let name = model.text_of(image.name)?.unwrap_or_default();
+    Ok(Some(Texture::Inside(Image { number, name, ..Image::default() })))
 }

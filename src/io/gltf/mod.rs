@@ -10,6 +10,7 @@ mod draco;
 mod draco_tests;
 #[cfg(test)]
 mod hostile_tests;
+mod images;
 mod load;
 mod materials;
 mod model;
@@ -22,6 +23,7 @@ mod tests;
 mod text;
 mod transform;
 mod triangles;
+mod values;
 mod writer;
 #[cfg(test)]
 mod writer_tests;

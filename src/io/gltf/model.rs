@@ -36,6 +36,8 @@ pub(crate) mod origin {
     pub(crate) const SEGMENT: u32 = 2;
     /// A file beside the model.
     pub(crate) const FILE: u32 = 3;
+    /// Nowhere: its views are compressed in a way that we do not read.
+    pub(crate) const COMPRESSED: u32 = 4;
 }
 
 /// A stretch of a buffer.
@@ -92,6 +94,7 @@ pub(crate) struct PrimitiveRecord {
     pub(crate) position: u32,
     pub(crate) indices: u32,
     pub(crate) uv: u32,
+    pub(crate) second_uv: u32,
     pub(crate) colour: u32,
     pub(crate) material: u32,
     /// View of the compressed bytes.
@@ -99,6 +102,7 @@ pub(crate) struct PrimitiveRecord {
     /// Numbers of the attributes in there.
     pub(crate) draco_position: u32,
     pub(crate) draco_uv: u32,
+    pub(crate) draco_second_uv: u32,
     pub(crate) draco_colour: u32,
     /// The buffer that they were decoded into.
     pub(crate) decoded: u32,
@@ -131,9 +135,23 @@ pub(crate) struct MaterialRecord {
     pub(crate) emissive: [f32; 3],
     pub(crate) metallic: f32,
     pub(crate) roughness: f32,
+    pub(crate) alpha_cutoff: f32,
     pub(crate) texture: u32,
+    /// Which texture coordinates it takes, and the map that they go through: rows of three.
+    pub(crate) uv_set: u32,
+    pub(crate) uv_map: [[f32; 3]; 2],
     /// One more than its number among the materials in use.
     pub(crate) used: u32,
+}
+
+/// An image: a file, a decoded segment, or a buffer view.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+pub(crate) struct ImageRecord {
+    /// Text number of its address, where it has one.
+    pub(crate) uri: u32,
+    pub(crate) view: u32,
+    pub(crate) name: u32,
 }
 
 /// The whole file but for its buffers' bytes.
@@ -154,14 +172,15 @@ pub(crate) struct Model {
     pub(crate) scenes: Table<[u64; 2]>,
     pub(crate) scene: u32,
     pub(crate) materials: Table<MaterialRecord>,
-    /// Image of each texture, and text number of the address of each image.
+    /// The image of each texture.
     pub(crate) textures: Table<u32>,
-    pub(crate) images: Table<u32>,
+    pub(crate) images: Table<ImageRecord>,
     pub(crate) texts: Dictionary,
     pub(crate) segments: Segments,
     /// Whether any triangle has texture coordinates, or colours.
     pub(crate) has_uvs: bool,
     pub(crate) has_colours: bool,
+    pub(crate) has_normals: bool,
 }
 
 impl Model {
@@ -186,6 +205,7 @@ impl Model {
             segments: Segments::new(scratch, share_bytes / 64),
             has_uvs: false,
             has_colours: false,
+            has_normals: false,
         }
     }
 
@@ -236,6 +256,16 @@ impl Model {
 
     pub(crate) fn node(&mut self, number: u32) -> Result<NodeRecord, IoError> {
         look_up(&self.path, &mut self.nodes, ("node", number))
+    }
+
+    /// A primitive, with those texture coordinates that its material takes.
+    pub(crate) fn primitive(&mut self, number: u64) -> Result<PrimitiveRecord, IoError> {
+        let mut record = self.primitives.get(number)?;
+        let is_second = record.material != NONE && self.material(record.material)?.uv_set == 1;
+        if is_second {
+            (record.uv, record.draco_uv) = (record.second_uv, record.draco_second_uv);
+        }
+        Ok(record)
     }
 
     pub(crate) fn material(&mut self, number: u32) -> Result<MaterialRecord, IoError> {

@@ -2,7 +2,7 @@
 //!
 //! A part is a node with triangles, also where names repeat; a vertex is numbered anew for every
 //! node, since each puts it elsewhere. Meshes are taken as they are stored: skins, morph targets
-//! and animations move nothing. Texture coordinates run downwards, as in the file. Indices that
+//! and animations move nothing. Texture coordinates are turned, so that v goes up. Indices that
 //! lead nowhere are counted, accessors that leave their buffers end the reading. Memory: half of
 //! the share for the objects of the file, a third for blocks of its buffers; see
 //! [`crate::io::gltf::draco`] for what is compressed.
@@ -10,6 +10,7 @@
 use crate::io::error::IoError;
 use crate::io::gltf::buffers::Buffers;
 use crate::io::gltf::container::find_chunks;
+use crate::io::gltf::images;
 use crate::io::gltf::load::load;
 use crate::io::gltf::materials;
 use crate::io::gltf::model::{MeshRecord, Model, NONE};
@@ -252,6 +253,10 @@ impl MeshSource for GltfReader {
         Some(LengthUnit::Meter)
     }
 
+    fn has_normals(&self) -> bool {
+        self.model.has_normals
+    }
+
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
         batch.clear();
         while batch.len() < BATCH_TRIANGLES {
@@ -294,6 +299,15 @@ impl MeshSource for GltfReader {
         }
         let material = self.materials.get(number.into())?;
         materials::material(&mut self.model, material)
+    }
+
+    fn image_block(
+        &mut self,
+        number: u32,
+        offset: u64,
+        bytes: &mut Vec<u8>,
+    ) -> Result<(), IoError> {
+        images::read_block(&mut self.model, &mut self.buffers, (number, offset), bytes)
     }
 
     fn discarded(&self) -> Discarded {

@@ -6,7 +6,7 @@
 use std::fmt;
 use std::marker::PhantomData;
 
-use serde::de::{Deserialize, Deserializer, Error, SeqAccess, Visitor};
+use serde::de::{Deserialize, Deserializer, Error, IgnoredAny, SeqAccess, Visitor};
 
 /// The most entries of a list in an object: children of a node, primitives of a mesh.
 pub(crate) const MOST_ENTRIES: usize = 1 << 20;
@@ -21,6 +21,15 @@ pub(crate) struct Asset {
 pub(crate) struct Buffer {
     pub(crate) uri: Option<String>,
     pub(crate) byte_length: u64,
+    #[serde(default)]
+    pub(crate) extensions: BufferExtensions,
+}
+
+/// Ways to leave out the bytes of a buffer.
+#[derive(Default, serde::Deserialize)]
+pub(crate) struct BufferExtensions {
+    #[serde(rename = "EXT_meshopt_compression", alias = "KHR_meshopt_compression")]
+    pub(crate) meshopt: Option<IgnoredAny>,
 }
 
 #[derive(serde::Deserialize)]
@@ -89,8 +98,12 @@ pub(crate) struct Attributes {
     pub(crate) position: Option<u32>,
     #[serde(rename = "TEXCOORD_0")]
     pub(crate) uv: Option<u32>,
+    #[serde(rename = "TEXCOORD_1")]
+    pub(crate) second_uv: Option<u32>,
     #[serde(rename = "COLOR_0")]
     pub(crate) colour: Option<u32>,
+    #[serde(rename = "NORMAL")]
+    pub(crate) normal: Option<u32>,
 }
 
 #[derive(Default, serde::Deserialize)]
@@ -150,9 +163,13 @@ pub(crate) struct Scene {
 pub(crate) struct Material {
     pub(crate) name: Option<String>,
     pub(crate) alpha_mode: Option<String>,
+    pub(crate) alpha_cutoff: Option<f32>,
     pub(crate) emissive_factor: Option<[f32; 3]>,
     #[serde(default)]
     pub(crate) pbr_metallic_roughness: Pbr,
+    pub(crate) normal_texture: Option<IgnoredAny>,
+    pub(crate) occlusion_texture: Option<IgnoredAny>,
+    pub(crate) emissive_texture: Option<IgnoredAny>,
     #[serde(default)]
     pub(crate) extensions: MaterialExtensions,
 }
@@ -164,11 +181,39 @@ pub(crate) struct Pbr {
     pub(crate) base_color_texture: Option<TextureInfo>,
     pub(crate) metallic_factor: Option<f32>,
     pub(crate) roughness_factor: Option<f32>,
+    pub(crate) metallic_roughness_texture: Option<IgnoredAny>,
 }
 
 #[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(crate) struct TextureInfo {
     pub(crate) index: u32,
+    #[serde(default)]
+    pub(crate) tex_coord: u32,
+    #[serde(default)]
+    pub(crate) extensions: TextureInfoExtensions,
+}
+
+#[derive(Default, serde::Deserialize)]
+pub(crate) struct TextureInfoExtensions {
+    #[serde(rename = "KHR_texture_transform")]
+    pub(crate) transform: Option<TextureTransform>,
+}
+
+#[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
+pub(crate) struct TextureTransform {
+    #[serde(default)]
+    pub(crate) offset: [f32; 2],
+    #[serde(default)]
+    pub(crate) rotation: f32,
+    #[serde(default = "one_each")]
+    pub(crate) scale: [f32; 2],
+    pub(crate) tex_coord: Option<u32>,
+}
+
+fn one_each() -> [f32; 2] {
+    [1.0; 2]
 }
 
 #[derive(Default, serde::Deserialize)]
@@ -216,8 +261,11 @@ pub(crate) struct ImageSource {
 }
 
 #[derive(serde::Deserialize)]
+#[serde(rename_all = "camelCase")]
 pub(crate) struct Image {
     pub(crate) uri: Option<String>,
+    pub(crate) buffer_view: Option<u32>,
+    pub(crate) name: Option<String>,
 }
 
 /// A list of bounded length.

@@ -4,6 +4,7 @@ use crate::io::error::IoError;
 use crate::io::gltf::accessor::{Demand, Field};
 use crate::io::gltf::buffers::Buffers;
 use crate::io::gltf::draco::decode;
+use crate::io::gltf::materials;
 use crate::io::gltf::model::{Model, NONE};
 use crate::io::gltf::transform::{Affine, IDENTITY, apply, mirrors};
 use crate::io::gltf::triangles::Mode;
@@ -28,6 +29,7 @@ pub(crate) struct Stream {
     position: Field,
     indices: Option<Field>,
     uv: Option<Field>,
+    uv_map: [[f32; 3]; 2],
     colour: Option<Field>,
     has_alpha: bool,
     /// Numbers of the same in the file.
@@ -55,13 +57,14 @@ impl Stream {
         number: u64,
         map: Affine,
     ) -> Result<Option<Self>, IoError> {
-        let record = model.primitives.get(number)?;
+        let record = model.primitive(number)?;
         let Some(mut mode) = Mode::of_code(record.mode).filter(|_| record.position != NONE) else {
             return Ok(None);
         };
-        if record.material != NONE {
-            model.material(record.material)?;
-        }
+        let uv_map = match record.material {
+            NONE => materials::UV_IDENTITY,
+            material => model.material(material)?.uv_map,
+        };
         let mut open = |accessor: u32, demand: &Demand| match accessor {
             NONE => Ok(None),
             accessor => Field::open(model, buffers, accessor, demand).map(Some),
@@ -91,6 +94,7 @@ impl Stream {
             position,
             indices,
             uv: uv.filter(|_| model.has_uvs),
+            uv_map,
             has_alpha: match record.colour {
                 NONE => false,
                 _ if record.draco_view != NONE => true,
@@ -170,7 +174,7 @@ impl Stream {
             if let Some(field) = &self.uv {
                 for (uv, &corner) in uvs.iter_mut().zip(&corners) {
                     let [u, v, ..] = field.get(model, buffers, corner.into())?;
-                    *uv = [u as f32, v as f32];
+                    *uv = materials::mapped(&self.uv_map, [u as f32, v as f32]);
                 }
             }
             batch.uvs.push(uvs);

@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::io::tests::{Content, read_all, read_bytes};
 use crate::io::{IoError, ReadOptions, open};
-use crate::mesh::Material;
+use crate::mesh::{Material, OtherMaps, Texture};
 use crate::store::Scratch;
 
 /// A GLB file.
@@ -265,7 +265,9 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         emissive: Some([2.0, 0.0, 0.0]),
         metallic: Some(1.0),
         roughness: Some(0.75),
-        texture: Some("a%20b.png".to_owned()),
+        alpha_cutoff: None,
+        texture: Some(Texture::Beside("a b.png".to_owned())),
+        other_maps: OtherMaps::default(),
     };
     let glass = Material {
         name: "glass".to_owned(),
@@ -275,6 +277,21 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         ..Material::default()
     };
     assert_eq!(content.materials, [blend, Material::default(), glass]);
+}
+
+#[test]
+fn factors_of_maps_mean_nothing_without_them_and_images_are_cut_off() {
+    let content = changed(|json, _| {
+        json["meshes"][0]["primitives"][0]["material"] = json!(0);
+        let pbr = json!({"metallicFactor": 0.5, "metallicRoughnessTexture": {"index": 0}});
+        json["materials"] = json!([{"pbrMetallicRoughness": pbr, "alphaMode": "MASK",
+            "emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0}}]);
+        json["textures"] = json!([{"source": 0}]);
+        json["images"] = json!([{"uri": "a.png"}]);
+    });
+    let material = &content.materials[0];
+    assert_eq!((material.metallic, material.roughness, material.emissive), (None, None, None));
+    assert_eq!((material.alpha_cutoff, material.transparent), (Some(0.5), false));
 }
 
 #[test]
@@ -357,4 +374,90 @@ fn the_share_of_memory_changes_nothing() {
     assert_eq!(small.batch.len(), count as usize);
     assert_eq!(small.part_names(), ["last"]);
     assert!(small == large);
+}
+
+/// Two sets of texture coordinates for the square, and a material that shows image 0.
+fn textured(info: &Value, images: &Value) -> Content {
+    changed(|json, binary| {
+        binary.extend(floats(&[0.25, 0.5].repeat(4)));
+        binary.extend(floats(&[0.5, 1.0].repeat(4)));
+        json["buffers"][0]["byteLength"] = json!(124);
+        for (view, offset) in [(2, 60), (3, 92)] {
+            let place = json!({"buffer": 0, "byteOffset": offset, "byteLength": 32});
+            add(json, "bufferViews", place);
+            let uvs =
+                json!({"bufferView": view, "componentType": 5126, "count": 4, "type": "VEC2"});
+            add(json, "accessors", uvs);
+        }
+        let primitive = &mut json["meshes"][0]["primitives"][0];
+        primitive["attributes"]["TEXCOORD_0"] = json!(2);
+        primitive["attributes"]["TEXCOORD_1"] = json!(3);
+        primitive["material"] = json!(0);
+        let pbr = json!({"baseColorTexture": info, "metallicRoughnessTexture": {"index": 0}});
+        json["materials"] = json!([{"pbrMetallicRoughness": pbr, "normalTexture": {"index": 0}}]);
+        json["textures"] = json!([{"source": 0}]);
+        json["images"] = images.clone();
+    })
+}
+
+#[test]
+fn texture_coordinates_are_mapped_and_turned_as_the_material_says() {
+    let images = json!([{"uri": "a.png"}]);
+    for (info, uv) in [
+        (json!({"index": 0}), [0.25, 0.5]),
+        (json!({"index": 0, "texCoord": 1}), [0.5, 0.0]),
+        (
+            json!({"index": 0, "extensions": {"KHR_texture_transform":
+                {"offset": [0.5, 0.25], "scale": [2.0, 0.5]}}}),
+            [1.0, 0.5],
+        ),
+        // A quarter turn takes (0.25, 0.5) to (0.5, -0.25) where v goes down.
+        (
+            json!({"index": 0, "extensions": {"KHR_texture_transform":
+                {"rotation": std::f32::consts::FRAC_PI_2}}}),
+            [0.5, 1.25],
+        ),
+        (json!({"index": 0, "extensions": {"KHR_texture_transform": {"texCoord": 1}}}), [0.5, 0.0]),
+    ] {
+        let content = textured(&info, &images);
+        for found in content.batch.uvs.as_flattened().iter() {
+            assert!((found[0] - uv[0]).abs() + (found[1] - uv[1]).abs() < 1e-6, "{info} {found:?}");
+        }
+        let maps = content.materials[0].other_maps;
+        assert_eq!(maps, OtherMaps::NORMAL.with(OtherMaps::GLOSS));
+    }
+}
+
+#[test]
+fn images_inside_are_numbered_and_those_that_are_none_cost_nothing() {
+    for (image, number) in [
+        (json!({"bufferView": 0, "mimeType": "image/png", "name": "skin"}), 0),
+        (json!({"uri": "data:image/png;base64,AAECAw==", "name": "skin"}), 0),
+        (json!({"uri": "data:image/png;base64,A?", "name": "skin"}), 0),
+        (json!({"uri": "data:image/png;base64,AAECA", "name": "skin"}), 0),
+        (json!({"bufferView": 77, "name": "skin"}), 0),
+        (json!({"uri": "data:image/png,plain", "name": "skin"}), 0),
+    ] {
+        let content = textured(&json!({"index": 0}), &json!([image]));
+        let texture = content.materials[0].texture.clone();
+        let is_plain = image["uri"] == json!("data:image/png,plain");
+        match texture.expect("one") {
+            Texture::Inside(image) => {
+                assert_eq!((image.name.as_str(), image.number), ("skin", number));
+            }
+            // No file has such a name.
+            Texture::Beside(path) => assert!(is_plain, "{path}"),
+        }
+    }
+}
+
+#[test]
+fn compression_that_is_not_read_is_refused_by_its_name() {
+    for name in ["EXT_meshopt_compression", "KHR_meshopt_compression"] {
+        assert!(refused(|json, _| json["extensionsRequired"] = json!([name])).contains(name));
+        let bare = refused(|json, _| {
+            json["buffers"] = json!([{"byteLength": 60, "extensions": {name: {"fallback": true}}}]);
+        });
+        assert!(bare.contains("meshopt_compression"), "{bare}");
+    }
 }

@@ -1,8 +1,8 @@
 //! The JSON of a file as its parser reads it: byte by byte, never held whole.
 //!
 //! Base64 in `data:` addresses would be: it is decoded into a scratch file on the way, and the
-//! parser sees [`DATA_MARK`] and the number of the segment instead; images are dropped. What is
-//! left of a text is at most [`MOST_TEXT_BYTES`] long. Memory: one block.
+//! parser sees [`DATA_MARK`] and the number of the segment instead. Of an image that is no base64
+//! nothing is kept. What is left of a text is at most [`MOST_TEXT_BYTES`] long. Memory: one block.
 
 use std::io::{ErrorKind, Read};
 use std::ops::Range;
@@ -200,21 +200,19 @@ impl<'t> Text<'t> {
         self.input.consume(length);
         self.left -= length as u64;
         let first = self.segments.end();
-        self.decode(is_image)?;
-        let mark = if is_image {
-            "data:".to_owned()
-        } else {
-            let number = self.segments.table.len();
-            self.segments.table.push([first, self.segments.end() - first])?;
-            format!("{DATA_MARK}{number}")
-        };
-        self.instead = mark.bytes().rev().collect();
+        let is_whole = self.decode(is_image)?;
+        let length = if is_whole { self.segments.end() - first } else { 0 };
+        let number = self.segments.table.len();
+        self.segments.table.push([first, length])?;
+        self.instead = format!("{DATA_MARK}{number}").bytes().rev().collect();
         Ok(())
     }
 
-    /// Decodes up to the end of the text, which is left where it is.
-    fn decode(&mut self, is_dropped: bool) -> Result<(), IoError> {
+    /// Decodes up to the end of the text, which is left where it is. An image that is no base64
+    /// gives `false`, anything else an error.
+    fn decode(&mut self, is_image: bool) -> Result<bool, IoError> {
         let mut base64 = Base64::default();
+        let mut is_whole = true;
         loop {
             let next = self.input.look_ahead(1)?.first().copied().filter(|_| self.left > 0);
             let byte = match next {
@@ -223,16 +221,18 @@ impl<'t> Text<'t> {
                 Some(b'\\') => self.escaped()?,
                 Some(_) => self.raw()?.unwrap_or_default(),
             };
-            if is_dropped {
+            if !is_whole {
                 continue;
             }
             match base64.push(byte) {
                 Some(bytes) => self.segments.push(bytes)?,
+                None if is_image => is_whole = false,
                 None => return Err(self.unreadable("base64", "another character")),
             }
         }
         match base64.finish() {
-            Some(bytes) => self.segments.push(bytes),
+            Some(bytes) => self.segments.push(bytes).map(|()| is_whole),
+            None if is_image => Ok(false),
             None => Err(self.unreadable("whole bytes in base64", "a part of one")),
         }
     }

@@ -1,20 +1,24 @@
 //! Writes GLB: positions as `f32`, and the triangles of each material as a primitive.
 //!
-//! Vertices and faces wait in scratch files. Once all are there, faces are brought into the order
-//! of their surfaces, and then the file is written from front to back. Memory: three buffers, and
-//! [`SORT_BYTES`] in the end.
+//! Vertices, what they have besides, and faces wait in scratch files. Once all are there, faces are
+//! brought into the order of their surfaces, and then the file is written from front to back, with
+//! the images of materials in use at its end. Memory: four buffers, and [`SORT_BYTES`] in the end.
 
 use std::path::Path;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::io::WriteOptions;
 use crate::io::error::IoError;
 use crate::io::gltf::container::{BINARY, CHUNK_HEADER_BYTES, HEADER_BYTES, JSON, MAGIC, VERSION};
 use crate::io::gltf::document::{Counts, Layout, write_document};
+use crate::io::gltf::values::Values;
 use crate::io::output::{Aside, FACES, Output, VERTICES};
-use crate::io::palette::Palette;
-use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
+use crate::io::palette::{Looks, Palette};
+use crate::io::textures::Textures;
+use crate::io::{Format, WriteOptions};
+use crate::mesh::{
+    CornerForm, MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, Surface, VertexValues,
+};
 use crate::store::{Record, Scratch, Sorter};
 
 /// For the order of the faces.
@@ -31,12 +35,13 @@ const SIZE_OFFSET: u64 = 8;
 const MOST_BYTES: u64 = u32::MAX as u64;
 
 /// Lays vertices and faces aside, the latter with their surfaces if they have any.
-#[derive(Debug)]
 pub(crate) struct GlbWriter {
     output: Output,
     scratch: Scratch,
     palette: Option<Palette>,
+    looks: Looks,
     positions: Aside,
+    values: Option<Values>,
     faces: Aside,
     vertices: u64,
     triangles: u64,
@@ -67,15 +72,10 @@ impl GlbWriter {
         scratch: &Scratch,
         options: &WriteOptions,
     ) -> Result<Self, IoError> {
-        Ok(Self {
-            positions: Aside::create(scratch, VERTICES)?,
-            faces: Aside::create(scratch, FACES)?,
-            output: Output::create(path, scratch)?,
-            scratch: scratch.clone(),
-            palette: options.palette.clone(),
-            vertices: 0,
-            triangles: 0,
-        })
+        let asides = (Aside::create(scratch, VERTICES)?, Aside::create(scratch, FACES)?);
+        let values = Values::create(scratch, options.attributes)?;
+        let output = Output::create(path, scratch)?;
+        Self::new(output, asides, values, (scratch, options, &SinkState::default()))
     }
 
     /// Goes on where an earlier writer was.
@@ -85,12 +85,28 @@ impl GlbWriter {
         options: &WriteOptions,
         state: &SinkState,
     ) -> Result<Self, IoError> {
+        let output = Output::reopen(path, scratch, &state.output)?;
+        let positions = Aside::reopen(scratch, VERTICES, &state.vertices_aside)?;
+        let faces = Aside::reopen(scratch, FACES, &state.aside)?;
+        let values = Values::reopen(scratch, options.attributes, &state.values_aside)?;
+        Self::new(output, (positions, faces), values, (scratch, options, state))
+    }
+
+    fn new(
+        output: Output,
+        (positions, faces): (Aside, Aside),
+        values: Option<Values>,
+        (scratch, options, state): (&Scratch, &WriteOptions, &SinkState),
+    ) -> Result<Self, IoError> {
+        let palette = options.palette.clone();
         Ok(Self {
-            output: Output::reopen(path, scratch, &state.output)?,
-            positions: Aside::reopen(scratch, VERTICES, &state.vertices_aside)?,
-            faces: Aside::reopen(scratch, FACES, &state.aside)?,
+            output,
             scratch: scratch.clone(),
-            palette: options.palette.clone(),
+            looks: palette.as_ref().map(Palette::looks).transpose()?.unwrap_or_default(),
+            palette,
+            positions,
+            values,
+            faces,
             vertices: state.vertices,
             triangles: state.triangles,
         })
@@ -100,6 +116,8 @@ impl GlbWriter {
     fn check_size(&self, front_bytes: u64) -> Result<(), IoError> {
         let triples = self.vertices.saturating_add(self.triangles);
         let bytes = triples.saturating_mul(TRIPLE_BYTES as u64).saturating_add(front_bytes);
+        let stride = self.values.as_ref().map_or(0, Values::stride);
+        let bytes = bytes.saturating_add(self.vertices.saturating_mul(stride));
         if bytes <= MOST_BYTES {
             return Ok(());
         }
@@ -148,6 +166,18 @@ impl GlbWriter {
         Ok((sorter, counts))
     }
 
+    /// The images of materials that triangles have.
+    fn textures(&self, counts: Option<&mut Counts>) -> Result<Textures, IoError> {
+        let shows = self.values.as_ref().is_some_and(|values| values.layout().has.uvs);
+        let (Some(palette), Some(counts), true) = (&self.palette, counts, shows) else {
+            return Ok(Textures::none(&self.scratch));
+        };
+        Textures::find(palette, Format::Glb, &self.scratch, |material| {
+            let is_known = u64::from(material) < counts.len();
+            Ok(is_known && counts.get(material.into())? != [0; 2])
+        })
+    }
+
     /// Writes the header and the JSON; sizes are put in once they are known.
     fn write_front(&mut self, layout: &mut Layout) -> Result<(), IoError> {
         self.output.write(MAGIC)?;
@@ -159,10 +189,11 @@ impl GlbWriter {
             self.output.write(b" ")?;
         }
         let json_end = self.output.bytes();
-        self.check_size(json_end + CHUNK_HEADER_BYTES)?;
+        let front_bytes = json_end + CHUNK_HEADER_BYTES;
+        self.check_size(front_bytes.saturating_add(layout.image_bytes))?;
         let json_bytes = (json_end - HEADER_BYTES - CHUNK_HEADER_BYTES) as u32;
         self.output.patch(&json_bytes.to_le_bytes(), HEADER_BYTES)?;
-        let binary_bytes = layout.vertex_bytes() + layout.index_bytes();
+        let binary_bytes = layout.binary_bytes();
         let mut size_bytes = json_end as u32;
         if binary_bytes > 0 {
             size_bytes += CHUNK_HEADER_BYTES as u32 + binary_bytes as u32;
@@ -180,7 +211,21 @@ impl MeshSink for GlbWriter {
         false
     }
 
+    fn corner_form(&self) -> CornerForm {
+        if self.values.is_some() { CornerForm::OfVertices } else { CornerForm::None }
+    }
+
+    fn vertex_values(&mut self, values: &VertexValues) -> Result<(), IoError> {
+        match &mut self.values {
+            Some(own) => own.push(values, self.vertices),
+            None => Ok(()),
+        }
+    }
+
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
+        if let Some(values) = &mut self.values {
+            values.fill(self.vertices)?;
+        }
         self.vertices += positions.len() as u64;
         self.check_size(0)?;
         let mut bytes = [0; BLOCK * TRIPLE_BYTES];
@@ -195,9 +240,10 @@ impl MeshSink for GlbWriter {
     }
 
     fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
-        let SinkTriangles { indices, surfaces, .. } = *triangles;
+        let indices = triangles.indices;
         self.triangles += indices.len() as u64;
         self.check_size(0)?;
+        let surfaces = self.looks.materials_of(triangles.surfaces)?;
         for (at, triangle) in indices.iter().enumerate() {
             let mut bytes = [0; TRIPLE_BYTES + 4];
             let surface = surfaces.get(at).copied().unwrap_or_default();
@@ -212,16 +258,22 @@ impl MeshSink for GlbWriter {
     }
 
     fn bytes_so_far(&self) -> u64 {
-        self.positions.bytes() + self.faces.bytes()
+        let values_bytes = self.values.as_ref().map_or(0, Values::bytes);
+        self.positions.bytes() + self.faces.bytes() + values_bytes
     }
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
+        let values_aside = match &mut self.values {
+            Some(values) => values.state(self.vertices)?,
+            None => SinkFile::default(),
+        };
         Ok(SinkState {
             vertices: self.vertices,
             triangles: self.triangles,
             output: self.output.state()?,
             aside: self.faces.state()?,
             vertices_aside: self.positions.state()?,
+            values_aside,
         })
     }
 
@@ -231,11 +283,21 @@ impl MeshSink for GlbWriter {
             Some(_) => Some(self.sort_faces()?),
             None => None,
         };
-        let (sorter, counts) = sorted.unzip();
+        let (sorter, mut counts) = sorted.unzip();
+        let textures = self.textures(counts.as_mut())?;
+        if let Some(values) = &mut self.values {
+            values.fill(self.vertices)?;
+        }
         let Self { vertices, triangles, .. } = *self;
-        self.write_front(&mut Layout { vertices, triangles, bounds, counts })?;
-        let Self { mut output, positions, faces, .. } = *self;
+        let values = self.values.as_ref().map(Values::layout).unwrap_or_default();
+        let mut layout =
+            Layout { vertices, triangles, bounds, counts, values, textures, image_bytes: 0 };
+        self.write_front(&mut layout)?;
+        let Self { mut output, positions, values, faces, .. } = *self;
         output.append(positions)?;
+        if let Some(values) = values {
+            output.append(values.into_aside())?;
+        }
         match sorter {
             None => output.append(faces)?,
             Some(sorter) => {
@@ -245,7 +307,19 @@ impl MeshSink for GlbWriter {
                 }
             }
         }
+        write_images(&mut output, &mut layout.textures)?;
         let file = output.finish()?;
         Ok(SinkStats { vertices, triangles, file })
     }
+}
+
+/// Writes the bytes of all images, each up to a multiple of four.
+fn write_images(output: &mut Output, textures: &mut Textures) -> Result<(), IoError> {
+    for number in 0..textures.count() as u32 {
+        let image = textures.image(number)?;
+        textures.copy(&image, |block| output.write(block))?;
+        let padding = image.bytes.next_multiple_of(4) - image.bytes;
+        output.write(&[0; 3][..padding as usize])?;
+    }
+    Ok(())
 }

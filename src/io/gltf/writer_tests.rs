@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::io::gltf::tests::read_file;
 use crate::io::tests::Content;
 use crate::io::{Format, IoError, Palette, PaletteWriter, Sink, WriteOptions, create, reopen};
-use crate::mesh::{Material, SinkState, SinkTriangles, Surface};
+use crate::mesh::{Material, OtherMaps, SinkState, SinkTriangles, Surface, Texture};
 use crate::store::Scratch;
 
 fn materials() -> Vec<Material> {
@@ -21,7 +21,9 @@ fn materials() -> Vec<Material> {
             emissive: Some([4.0, 0.0, 2.0]),
             metallic: Some(0.75),
             roughness: Some(0.1),
-            texture: Some("a.png".to_owned()),
+            alpha_cutoff: None,
+            texture: Some(Texture::Beside("a.png".to_owned())),
+            other_maps: OtherMaps::default(),
         },
         Material { name: "\"wood\"".to_owned(), ..Material::default() },
     ]
@@ -31,7 +33,7 @@ fn palette(scratch: &Scratch, materials: &[Material]) -> WriteOptions {
     let mut writer = PaletteWriter::create(scratch).expect("creates");
     materials.iter().for_each(|material| writer.push(material).expect("pushes"));
     let state = writer.finish().expect("finishes");
-    WriteOptions { palette: Some(Palette::new(scratch, &state)), ..WriteOptions::default() }
+    WriteOptions { palette: Some(Palette::new(scratch, &state[0])), ..WriteOptions::default() }
 }
 
 /// Surfaces in no order, with patches.

@@ -1,8 +1,8 @@
 //! The MTL file beside an OBJ output.
 //!
 //! In:         the palette of the output. Out: one `newmtl` for every material, and one more where
-//!             patches are told apart.
-//! Memory:     one material, and the names.
+//!             patches are told apart; the ways to images, where texture coordinates are written.
+//! Memory:     one material, the names, and the numbers of images.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -10,7 +10,8 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::output::Output;
 use crate::io::output_names::OutputNames;
-use crate::io::{Palette, WriteOptions};
+use crate::io::textures::Textures;
+use crate::io::{Format, Palette, WriteOptions};
 use crate::mesh::{Material, Surface};
 use crate::store::Scratch;
 
@@ -37,11 +38,17 @@ pub fn write_library(
     let mut names = OutputNames::new(palette, scratch)?;
     let mut output = Output::create(path, scratch)?;
     output.write(LIBRARY_MARK.as_bytes())?;
+    let mut textures = match options.attributes.uvs {
+        true => Textures::find(palette, Format::Obj, scratch, |_| Ok(true))?,
+        false => Textures::none(scratch),
+    };
     let kinds = if options.tag_patches { &[false, true][..] } else { &[false] };
     palette.for_each(|number, material| {
+        let image = textures.of_material(number)?;
+        let image = image.map(|image| textures.reference(image, options)).transpose()?.flatten();
         for &is_patch in kinds {
             let name = names.name(Surface::new(number, is_patch))?;
-            output.write(statements(&name, &material).as_bytes())?;
+            output.write(statements(&name, &material, image.as_deref()).as_bytes())?;
         }
         Ok(())
     })?;
@@ -50,7 +57,7 @@ pub fn write_library(
 }
 
 /// A material as statements. What the input does not state is left out.
-fn statements(name: &str, material: &Material) -> String {
+fn statements(name: &str, material: &Material, image: Option<&str>) -> String {
     let mut text = format!("\nnewmtl {name}\n");
     let mut line = |word: &str, numbers: &[f32]| {
         text.push_str(word);
@@ -73,6 +80,13 @@ fn statements(name: &str, material: &Material) -> String {
     }
     if let Some(roughness) = material.roughness {
         line("Pr", &[roughness]);
+    }
+    if let Some(image) = image {
+        // Where no colour is stated, some readers take black for the factor.
+        if material.diffuse.is_none() {
+            line("Kd", &[1.0; 3]);
+        }
+        writeln!(text, "map_Kd {image}").expect("text grows");
     }
     text
 }

@@ -15,7 +15,7 @@ use crate::io::input::Input;
 use crate::io::names::Materials;
 use crate::io::numbers::parse_number;
 use crate::io::words::{Dialect, Words};
-use crate::mesh::Material;
+use crate::mesh::{Material, OtherMaps, Texture};
 use crate::store::Scratch;
 
 /// The most names of libraries in one file, and the most files that they lead to.
@@ -103,19 +103,39 @@ impl Library {
         }
         let Ok(input) = Input::open(path, 0) else { return Ok(()) };
         let mut words = Words::new(input, Dialect::Comments);
-        let mut lines = Lines::default();
-        while let Ok(Some((keyword, line))) = read_line(&mut words) {
+        let (mut lines, mut maps) = (Lines::default(), OtherMaps::default());
+        while let Ok(Some(statement)) = read_line(&mut words) {
+            let (keyword, line) = match statement {
+                Stated::Line(keyword, line) => (keyword, line),
+                Stated::Map(map) => {
+                    maps = maps.with(map);
+                    continue;
+                }
+            };
             if keyword == Keyword::Name {
-                self.define(path, &std::mem::take(&mut lines).concat())?;
+                let text = std::mem::take(&mut lines).concat();
+                self.define(path, &text, std::mem::take(&mut maps))?;
             }
             // The last of several equal statements counts.
             lines[keyword as usize] = line;
         }
-        self.define(path, &lines.concat())
+        self.define(path, &lines.concat(), maps)
+    }
+
+    /// An image that the library at `path` names: from its own folder, if it is there, else from
+    /// the model's.
+    fn texture(&self, path: &Path, name: String) -> Texture {
+        let own = self.folder.as_ref().and_then(|folder| {
+            let below = path.parent()?.strip_prefix(folder).ok()?.to_str()?;
+            let joined = format!("{below}/{name}");
+            let is_there = !below.is_empty() && file_inside(folder, joined.as_bytes()).is_some();
+            is_there.then_some(joined)
+        });
+        Texture::Beside(own.unwrap_or(name))
     }
 
     /// Adds the material of a text that holds one.
-    fn define(&mut self, path: &Path, text: &str) -> Result<(), IoError> {
+    fn define(&mut self, path: &Path, text: &str, maps: OtherMaps) -> Result<(), IoError> {
         let Ok((materials, _)) = tobj::load_mtl_buf(&mut text.as_bytes()) else { return Ok(()) };
         for material in materials {
             let stated = |name: &str| material.unknown_param.get(name).map(String::as_str);
@@ -136,7 +156,9 @@ impl Library {
                 emissive: stated("Ke").and_then(colour).filter(is_finite),
                 metallic: number("Pm"),
                 roughness: number("Pr"),
-                texture: material.diffuse_texture,
+                alpha_cutoff: None,
+                texture: material.diffuse_texture.map(|name| self.texture(path, name)),
+                other_maps: maps,
                 name: material.name,
             };
             let number = self.defined.number(path, &material.name)?;
@@ -162,8 +184,16 @@ enum Keyword {
 /// The statements of one material, by keyword.
 type Lines = [String; 8];
 
-/// The next statement for `tobj`, in its words; `None` at the end of the file.
-fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
+/// What a library states.
+enum Stated {
+    /// A statement for `tobj`, in its words.
+    Line(Keyword, String),
+    /// A map that we know of, and no more.
+    Map(OtherMaps),
+}
+
+/// The next statement that means something; `None` at the end of the file.
+fn read_line(words: &mut Words) -> Result<Option<Stated>, IoError> {
     loop {
         let (keyword, needed) = match words.word()? {
             None => return Ok(None),
@@ -175,18 +205,23 @@ fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
             Some(b"Pm") => (Keyword::Metallic, 1),
             Some(b"Pr") => (Keyword::Roughness, 1),
             Some(b"map_Kd") => (Keyword::Texture, 0),
-            Some(_) => {
-                words.skip_line()?;
-                continue;
-            }
+            Some(word) => match other_map(word) {
+                Some(map) => return Ok(Some(Stated::Map(map))),
+                None => {
+                    words.skip_line()?;
+                    continue;
+                }
+            },
         };
         match keyword {
-            Keyword::Name => return Ok(Some((keyword, format!("newmtl {}\n", words.name()?)))),
+            Keyword::Name => {
+                return Ok(Some(Stated::Line(keyword, format!("newmtl {}\n", words.name()?))));
+            }
             // The name may follow options, and may hold blanks: what begins with a dash is skipped.
             Keyword::Texture => {
                 let line = words.name()?;
                 let name = texture_name(&line);
-                return Ok(Some((keyword, format!("map_Kd {name}\n"))));
+                return Ok(Some(Stated::Line(keyword, format!("map_Kd {name}\n"))));
             }
             _ => {}
         }
@@ -198,9 +233,21 @@ fn read_line(words: &mut Words) -> Result<Option<(Keyword, String)>, IoError> {
         if numbers.len() == needed {
             let numbers: Vec<_> = numbers.iter().map(f64::to_string).collect();
             let word = ["newmtl", "Kd", "d", "Tr", "Ke", "Pm", "Pr", "map_Kd"][keyword as usize];
-            return Ok(Some((keyword, format!("{word} {}\n", numbers.join(" ")))));
+            return Ok(Some(Stated::Line(keyword, format!("{word} {}\n", numbers.join(" ")))));
         }
     }
+}
+
+/// The map that a statement gives, if we know of such.
+fn other_map(keyword: &[u8]) -> Option<OtherMaps> {
+    Some(match keyword.to_ascii_lowercase().as_slice() {
+        b"map_bump" | b"bump" | b"norm" | b"map_kn" | b"disp" => OtherMaps::NORMAL,
+        b"map_ks" | b"map_ns" | b"map_pr" | b"map_pm" | b"map_ps" | b"refl" => OtherMaps::GLOSS,
+        b"map_ke" => OtherMaps::EMISSION,
+        b"map_d" | b"map_tr" => OtherMaps::OPACITY,
+        b"map_ao" => OtherMaps::OCCLUSION,
+        _ => return None,
+    })
 }
 
 fn is_finite(colour: &[f32; 3]) -> bool {
@@ -217,7 +264,11 @@ fn colour(text: &str) -> Option<[f32; 3]> {
 fn texture_name(line: &str) -> &str {
     let mut rest = line.trim_start();
     while rest.starts_with('-') {
+        let takes_word = ["-imfchan", "-type", "-texres"].iter().any(|o| rest.starts_with(o));
         rest = after_word(rest);
+        if takes_word {
+            rest = after_word(rest);
+        }
         // Numbers and switches belong to the option.
         while let Some(word) = rest.split_ascii_whitespace().next()
             && (["on", "off"].contains(&word) || word.parse::<f64>().is_ok())

@@ -58,6 +58,7 @@ pub(crate) struct Seen {
     pub(crate) colours: Vec<[u8; 4]>,
     pub(crate) vertices: u64,
     pub(crate) textures: u64,
+    pub(crate) has_normals: bool,
     pub(crate) is_obj: bool,
     pub(crate) bytes_read: u64,
 }
@@ -93,6 +94,7 @@ impl Normalised {
                 colours: Vec::new(),
                 vertices: 0,
                 textures: 0,
+                has_normals: false,
                 is_obj: false,
                 bytes_read: 0,
             },
@@ -145,6 +147,7 @@ impl Normalised {
                     let names = self.words.raw_name()?;
                     self.seen.library.load(&names)?;
                 }
+                Statement::Normal => self.seen.has_normals = true,
                 Statement::Known | Statement::Unknown => {}
             }
             self.words.skip_line()?;

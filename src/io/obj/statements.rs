@@ -10,6 +10,7 @@ use crate::io::words::Words;
 pub(crate) enum Statement {
     Vertex,
     Texture,
+    Normal,
     Face,
     Object,
     Group,
@@ -27,12 +28,13 @@ impl Statement {
         Ok(words.word()?.map(|keyword| match keyword {
             b"v" => Self::Vertex,
             b"vt" => Self::Texture,
+            b"vn" => Self::Normal,
             b"f" => Self::Face,
             b"o" => Self::Object,
             b"g" => Self::Group,
             b"usemtl" => Self::UseMaterial,
             b"mtllib" => Self::Library,
-            b"vn" | b"vp" | b"l" | b"p" | b"s" | b"fo" | b"mg" | b"curv" | b"surf" => Self::Known,
+            b"vp" | b"l" | b"p" | b"s" | b"fo" | b"mg" | b"curv" | b"surf" => Self::Known,
             _ => Self::Unknown,
         }))
     }

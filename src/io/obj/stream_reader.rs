@@ -28,6 +28,7 @@ pub(crate) struct ObjStreamReader {
     textures: Table<[f32; 2]>,
     colours: Option<Table<[u8; 4]>>,
     has_objects: bool,
+    has_normals: bool,
     library: Library,
     vertices_so_far: u64,
     textures_so_far: u64,
@@ -57,6 +58,7 @@ impl ObjStreamReader {
             textures: Table::new(scratch, share_bytes / 8),
             colours: None,
             has_objects: false,
+            has_normals: false,
             library,
             vertices_so_far: 0,
             textures_so_far: 0,
@@ -84,6 +86,7 @@ impl ObjStreamReader {
                     self.textures.push(texture.map(|x| x as f32))?;
                 }
                 Statement::Object => self.has_objects = true,
+                Statement::Normal => self.has_normals = true,
                 Statement::Library => {
                     let names = self.words.raw_name()?;
                     self.library.load(&names)?;
@@ -234,6 +237,10 @@ impl MeshSource for ObjStreamReader {
 
     fn material(&mut self, number: u32) -> Result<Material, IoError> {
         self.materials.get(number)
+    }
+
+    fn has_normals(&self) -> bool {
+        self.has_normals
     }
 
     fn discarded(&self) -> Discarded {

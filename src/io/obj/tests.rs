@@ -9,6 +9,7 @@ use crate::io::obj::stream_reader::ObjStreamReader;
 use crate::io::obj::tobj_reader::{Attempt, TobjReader};
 use crate::io::tests::{Content, read_all};
 use crate::io::{IoError, ReadOptions};
+use crate::mesh::{OtherMaps, Texture};
 use crate::store::Scratch;
 
 struct Model {
@@ -172,6 +173,30 @@ fn what_does_not_parse_is_refused_with_line_and_word() {
     let garbage = Model::new(&[7, 200, 10, 0, 0, 255]);
     assert!(garbage.by_tobj().is_none());
     assert!(matches!(garbage.by_stream(), Err(IoError::Unreadable { .. })));
+}
+
+#[test]
+fn images_are_found_behind_options_and_in_the_folder_of_their_library() {
+    for (line, name) in [
+        ("map_Kd my skin.png", "my skin.png"),
+        (
+            "map_Kd -s 1 1 1 -o 0.5 0 -bm 0.2 -clamp on -imfchan r -mm 0 1 my skin.png",
+            "my skin.png",
+        ),
+        ("map_Kd -blendu off -texres 512 7.png", "7.png"),
+        ("map_Kd a.png\nmap_Kd own.png", "sub/own.png"),
+        ("map_Kd C:\\Users\\x\\a.png", "C:\\Users\\x\\a.png"),
+    ] {
+        let head = format!("mtllib sub/a.mtl\n{SQUARE}usemtl m\nf 1 2 3\n");
+        let model = Model::new(head.as_bytes());
+        std::fs::create_dir(model.folder.path().join("sub")).expect("a folder");
+        model.add("sub/own.png", b"own");
+        let text = format!("newmtl m\nmap_Bump -bm 1 b.png\nmap_d d.png\n{line}\nnewmtl n\n");
+        model.add("sub/a.mtl", text.as_bytes());
+        let materials = model.twins().materials;
+        assert_eq!(materials[0].texture, Some(Texture::Beside(name.to_owned())), "{line}");
+        assert_eq!(materials[0].other_maps, OtherMaps::NORMAL.with(OtherMaps::OPACITY));
+    }
 }
 
 #[test]

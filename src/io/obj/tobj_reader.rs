@@ -159,6 +159,10 @@ impl MeshSource for TobjReader {
         self.materials.get(number)
     }
 
+    fn has_normals(&self) -> bool {
+        self.seen.has_normals
+    }
+
     fn discarded(&self) -> Discarded {
         self.discarded
     }

@@ -1,25 +1,34 @@
-//! Writes OBJ text, every coordinate as the shortest text that gives its `f64` back.
+//! Writes OBJ text, every number as the shortest text that gives its bits back.
 //!
-//! Vertices and faces are written as they come: indices count from the start of the file. The faces
-//! of one call are grouped by material, and every group names its own. Memory: one buffer, the
+//! Vertices, lists and faces are written as they come: indices count from the start of the file.
+//! The faces of one call are grouped by material, and every group names its own. Colours stand
+//! behind positions, in steps of 1/10000, without their alpha. Memory: one buffer, the vertices or
 //! triangles of one call, and the names of materials.
 
 use std::path::Path;
 
-use crate::io::WriteOptions;
 use crate::io::error::IoError;
-use crate::io::numbers::{push_count, push_number};
+use crate::io::numbers::{push_count, push_number, push_single};
 use crate::io::output::Output;
 use crate::io::output_names::OutputNames;
-use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
+use crate::io::palette::Looks;
+use crate::io::polygon::WHITE;
+use crate::io::{Format, WriteOptions};
+use crate::mesh::{
+    Attributes, CornerForm, MeshSink, SinkState, SinkStats, SinkTriangles, Surface, VertexValues,
+};
 use crate::store::Scratch;
 
-/// Writes `v`, `usemtl` and `f` lines.
+/// Writes `v`, `vt`, `vn`, `usemtl` and `f` lines.
 pub(crate) struct ObjWriter {
     output: Output,
+    attributes: Attributes,
     /// Names of materials, where triangles have any.
     names: Option<OutputNames>,
+    looks: Looks,
     order: Vec<(Surface, u32)>,
+    /// Vertices of the last call, while their colours may come.
+    pending: Vec<[f64; 3]>,
     text: Vec<u8>,
     vertices: u64,
     triangles: u64,
@@ -55,22 +64,79 @@ impl ObjWriter {
         options: &WriteOptions,
         state: &SinkState,
     ) -> Result<Self, IoError> {
-        let names = options.palette.as_ref().map(|palette| OutputNames::new(palette, scratch));
+        let palette = options.palette.as_ref();
+        let names = palette.map(|palette| OutputNames::new(palette, scratch)).transpose()?;
+        let looks = palette.map(|palette| palette.looks()).transpose()?.unwrap_or_default();
         let SinkState { vertices, triangles, .. } = *state;
-        let (order, text) = (Vec::new(), Vec::new());
-        Ok(Self { output, names: names.transpose()?, order, text, vertices, triangles })
+        Ok(Self {
+            output,
+            attributes: options.attributes.and(Format::Obj.attributes()),
+            names,
+            looks,
+            order: Vec::new(),
+            pending: Vec::new(),
+            text: Vec::new(),
+            vertices,
+            triangles,
+        })
     }
 
-    fn face(&mut self, triangle: [u32; 3]) -> Result<(), IoError> {
+    /// A line of a keyword and numbers.
+    fn line<T: Copy>(
+        &mut self,
+        keyword: &[u8],
+        numbers: &[T],
+        push: fn(&mut Vec<u8>, T),
+    ) -> Result<(), IoError> {
         self.text.clear();
-        self.text.push(b'f');
-        for index in triangle {
+        self.text.extend_from_slice(keyword);
+        for &number in numbers {
             self.text.push(b' ');
-            push_count(&mut self.text, u64::from(index) + 1);
+            push(&mut self.text, number);
         }
         self.text.push(b'\n');
         self.output.write(&self.text)
     }
+
+    /// Writes the vertices that wait, white where no colour came.
+    fn write_pending(&mut self, colours: &[[u8; 4]]) -> Result<(), IoError> {
+        let pending = std::mem::take(&mut self.pending);
+        for (at, &[x, y, z]) in pending.iter().enumerate() {
+            let [red, green, blue, _] = colours.get(at).copied().unwrap_or(WHITE).map(channel);
+            self.line(b"v", &[x, y, z, red, green, blue], push_number)?;
+        }
+        self.pending = pending;
+        self.pending.clear();
+        Ok(())
+    }
+
+    fn face(&mut self, triangles: &SinkTriangles, at: usize) -> Result<(), IoError> {
+        let uvs = triangles.uvs.numbers.get(at).filter(|_| self.attributes.uvs);
+        let normals = triangles.normals.numbers.get(at).filter(|_| self.attributes.normals);
+        self.text.clear();
+        self.text.push(b'f');
+        for (corner, &index) in triangles.indices[at].iter().enumerate() {
+            self.text.push(b' ');
+            push_count(&mut self.text, u64::from(index) + 1);
+            if uvs.is_some() || normals.is_some() {
+                self.text.push(b'/');
+            }
+            if let Some(uvs) = uvs {
+                push_count(&mut self.text, u64::from(uvs[corner]) + 1);
+            }
+            if let Some(normals) = normals {
+                self.text.push(b'/');
+                push_count(&mut self.text, u64::from(normals[corner]) + 1);
+            }
+        }
+        self.text.push(b'\n');
+        self.output.write(&self.text)
+    }
+}
+
+/// A channel with no more digits than give it back.
+fn channel(byte: u8) -> f64 {
+    (f64::from(byte) / 255.0 * 1e4).round() / 1e4
 }
 
 impl MeshSink for ObjWriter {
@@ -80,30 +146,44 @@ impl MeshSink for ObjWriter {
         false
     }
 
+    fn corner_form(&self) -> CornerForm {
+        if self.attributes.any() { CornerForm::OfCorners } else { CornerForm::None }
+    }
+
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
         self.vertices += positions.len() as u64;
-        for position in positions {
-            self.text.clear();
-            self.text.push(b'v');
-            for &coordinate in position {
-                self.text.push(b' ');
-                push_number(&mut self.text, coordinate);
-            }
-            self.text.push(b'\n');
-            self.output.write(&self.text)?;
+        if self.attributes.colours {
+            self.write_pending(&[])?;
+            self.pending.extend_from_slice(positions);
+            return Ok(());
         }
-        Ok(())
+        positions.iter().try_for_each(|position| self.line(b"v", position, push_number))
+    }
+
+    fn vertex_values(&mut self, values: &VertexValues) -> Result<(), IoError> {
+        self.write_pending(values.colours)
+    }
+
+    fn list_uvs(&mut self, uvs: &[[f32; 2]]) -> Result<(), IoError> {
+        let uvs = if self.attributes.uvs { uvs } else { &[] };
+        uvs.iter().try_for_each(|uv| self.line(b"vt", uv, push_single))
+    }
+
+    fn list_normals(&mut self, normals: &[[f32; 3]]) -> Result<(), IoError> {
+        let normals = if self.attributes.normals { normals } else { &[] };
+        normals.iter().try_for_each(|normal| self.line(b"vn", normal, push_single))
     }
 
     fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
-        let SinkTriangles { indices, surfaces, .. } = *triangles;
-        self.triangles += indices.len() as u64;
+        self.write_pending(&[])?;
+        let count = triangles.indices.len();
+        self.triangles += count as u64;
         if self.names.is_none() {
-            return indices.iter().try_for_each(|&triangle| self.face(triangle));
+            return (0..count).try_for_each(|at| self.face(triangles, at));
         }
         let mut order = std::mem::take(&mut self.order);
         order.clear();
-        order.extend(surfaces.iter().copied().zip(0..));
+        order.extend(self.looks.materials_of(triangles.surfaces)?.iter().copied().zip(0..));
         order.sort_unstable();
         let mut named = None;
         for &(surface, triangle) in &order {
@@ -114,7 +194,7 @@ impl MeshSink for ObjWriter {
                 self.output.write(line.as_bytes())?;
                 named = Some(surface);
             }
-            self.face(indices[triangle as usize])?;
+            self.face(triangles, triangle as usize)?;
         }
         self.order = order;
         Ok(())
@@ -125,12 +205,14 @@ impl MeshSink for ObjWriter {
     }
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
+        self.write_pending(&[])?;
         let output = self.output.state()?;
         let Self { vertices, triangles, .. } = *self;
         Ok(SinkState { vertices, triangles, output, ..SinkState::default() })
     }
 
-    fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
+    fn finish(mut self: Box<Self>) -> Result<SinkStats, IoError> {
+        self.write_pending(&[])?;
         let Self { output, vertices, triangles, .. } = *self;
         let file = output.finish()?;
         Ok(SinkStats { vertices, triangles, file })

@@ -76,6 +76,14 @@ pub(crate) enum Role {
     Material,
     /// Whether a face closes what was open.
     Patch,
+    /// u or v of a vertex.
+    Texture(usize),
+    /// x of a vertex's normal, which tells that there is one.
+    Normal,
+    /// The texture coordinates of a face's corners, as a list.
+    Coordinates,
+    /// The number of a face's image.
+    Image,
     /// The corners of a face or a strip.
     Indices,
     /// Passed over.
@@ -187,7 +195,22 @@ impl Header {
     }
 
     pub(crate) fn has_materials(&self) -> bool {
-        self.elements.iter().any(|e| e.kind == Kind::Face && e.has(Role::Material))
+        self.face_has(Role::Material)
+    }
+
+    /// Whether faces have a property of this role.
+    pub(crate) fn face_has(&self, role: Role) -> bool {
+        self.elements.iter().any(|e| e.kind == Kind::Face && e.has(role))
+    }
+
+    /// Whether vertices have texture coordinates.
+    pub(crate) fn has_vertex_uvs(&self) -> bool {
+        let vertices = self.vertex_element().map(|at| &self.elements[at]);
+        vertices.is_some_and(|e| e.has(Role::Texture(0)) && e.has(Role::Texture(1)))
+    }
+
+    pub(crate) fn has_normals(&self) -> bool {
+        self.vertex_element().is_some_and(|at| self.elements[at].has(Role::Normal))
     }
 
     pub(crate) fn has_colours(&self) -> bool {
@@ -296,6 +319,11 @@ fn role(kind: Kind, is_list: bool, name: &[u8]) -> Role {
         (Kind::Vertex | Kind::Face, false, b"green" | b"diffuse_green") => Role::Colour(1),
         (Kind::Vertex | Kind::Face, false, b"blue" | b"diffuse_blue") => Role::Colour(2),
         (Kind::Vertex | Kind::Face, false, b"alpha" | b"diffuse_alpha") => Role::Colour(3),
+        (Kind::Vertex, false, b"s" | b"u" | b"texture_u" | b"texture_s") => Role::Texture(0),
+        (Kind::Vertex, false, b"t" | b"v" | b"texture_v" | b"texture_t") => Role::Texture(1),
+        (Kind::Vertex, false, b"nx") => Role::Normal,
+        (Kind::Face, true, b"texcoord") => Role::Coordinates,
+        (Kind::Face, false, b"texnumber") => Role::Image,
         (Kind::Face, false, b"material_index") => Role::Material,
         (Kind::Face, false, b"patch") => Role::Patch,
         (Kind::Face | Kind::Strips, true, b"vertex_indices" | b"vertex_index") => Role::Indices,

@@ -3,6 +3,7 @@
 mod body;
 mod header;
 mod materials;
+mod paint;
 mod plain;
 mod reader;
 mod strip;

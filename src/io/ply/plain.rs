@@ -68,6 +68,8 @@ fn paint(bytes: &[u8]) -> FaceSurface {
         index: u32::from_le_bytes(number(0)),
         colour: Some(number(4)),
         is_patch: paint[8] != 0,
+        // What shows no image has no texture coordinates, and is not plain.
+        image: Some(-1),
     }
 }
 

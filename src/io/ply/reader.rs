@@ -2,8 +2,9 @@
 //!
 //! Elements may come in any order: faces in front of the vertices are read in a second pass. Any
 //! number types, any further elements, properties and lists. Indices that lead nowhere are counted,
-//! numbers that do not parse or are missing end the reading. Memory: half of the share for the
-//! positions, an eighth for the colours, both spilled beyond.
+//! numbers that do not parse or are missing end the reading. Texture coordinates stand with the
+//! vertices, or in a list `texcoord` of each face, which counts where both do. Memory: half of the
+//! share for the positions, an eighth each for colours and texture coordinates, spilled beyond.
 
 use crate::io::error::IoError;
 use crate::io::input::Input;
@@ -13,7 +14,7 @@ use crate::io::ply::materials::{FaceMaterials, FaceSurface};
 use crate::io::ply::plain;
 use crate::io::ply::strip::{Step, Strip};
 use crate::io::polygon::{
-    Columns, Corner, Owner, PolygonCutter, WHITE, checked_index, polygon_number,
+    Columns, Corner, MOST_CORNERS, Owner, PolygonCutter, WHITE, checked_index, polygon_number,
 };
 use crate::io::words::{Dialect, Words};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
@@ -27,6 +28,10 @@ pub(crate) struct PlyReader {
     vertices_known: bool,
     positions: Table<[f64; 3]>,
     colours: Option<Table<[u8; 4]>>,
+    vertex_uvs: Option<Table<[f32; 2]>>,
+    has_uvs: bool,
+    /// The texture coordinates of the face under way, as numbers.
+    coordinates: Vec<f64>,
     /// Where faces have any, and what the one under way says of its own.
     materials: Option<FaceMaterials>,
     face: FaceSurface,
@@ -54,12 +59,23 @@ impl PlyReader {
         let header = Header::read(&mut words, &mut materials)?;
         let body = Body::new(words, header.encoding);
         let has_colours = header.has_colours();
-        let columns = Columns { indices: true, uvs: false, colours: has_colours };
+        let (has_lists, has_vertex_uvs) =
+            (header.face_has(Role::Coordinates), header.has_vertex_uvs());
+        let has_uvs = has_lists || has_vertex_uvs;
+        let columns = Columns { indices: true, uvs: has_uvs, colours: has_colours };
+        let is_by_image = has_uvs && !header.has_materials() && materials.has_images();
+        if is_by_image {
+            materials.go_by_image();
+        }
+        let uvs_share = options.share_bytes / 8;
         Ok(Self {
             body,
             vertices_known: false,
             positions: Table::new(scratch, options.share_bytes / 2),
-            materials: header.has_materials().then_some(materials),
+            vertex_uvs: has_vertex_uvs.then(|| Table::new(scratch, uvs_share)),
+            has_uvs,
+            coordinates: Vec::new(),
+            materials: (header.has_materials() || is_by_image).then_some(materials),
             face: FaceSurface::default(),
             colours: has_colours.then(|| Table::new(scratch, options.share_bytes / 8)),
             element: 0,
@@ -101,7 +117,7 @@ impl PlyReader {
     /// Reads triangles as far as they are plain and the batch has room for them.
     fn read_plain_triangles(&mut self, batch: &mut TriangleBatch) -> Result<(), IoError> {
         let Some(element) = self.header.elements.get(self.element) else { return Ok(()) };
-        if self.colours.is_some() {
+        if self.colours.is_some() || self.has_uvs {
             return Ok(());
         }
         if let Some(bytes) = plain::plain_triangle_bytes(&self.body, element) {
@@ -123,6 +139,7 @@ impl PlyReader {
     fn read_vertex(&mut self, element: usize) -> Result<(), IoError> {
         let mut position = [0.0; 3];
         let mut colour = WHITE;
+        let mut uv = [0.0; 2];
         for property in &self.header.elements[element].properties {
             if let Some(length) = property.length {
                 let count = self.body.length(length, property.scalar)?;
@@ -133,7 +150,14 @@ impl PlyReader {
             match property.role {
                 Role::Coordinate(axis) => position[axis] = number,
                 Role::Colour(channel) => colour[channel] = property.scalar.channel(number),
-                Role::Indices | Role::Material | Role::Patch | Role::Other => {}
+                Role::Texture(axis) => uv[axis] = number as f32,
+                Role::Indices
+                | Role::Normal
+                | Role::Coordinates
+                | Role::Material
+                | Role::Image
+                | Role::Patch
+                | Role::Other => {}
             }
         }
         if self.positions.len() >= u64::from(u32::MAX) {
@@ -143,6 +167,9 @@ impl PlyReader {
         self.positions.push(position)?;
         if let Some(colours) = &mut self.colours {
             colours.push(colour)?;
+        }
+        if let Some(uvs) = &mut self.vertex_uvs {
+            uvs.push(uv)?;
         }
         Ok(())
     }
@@ -183,7 +210,8 @@ impl PlyReader {
                     return Ok(());
                 }
                 (Role::Indices, _) => self.read_corners(property.scalar, count)?,
-                (Role::Material | Role::Patch | Role::Colour(_), Kind::Face) => {
+                (Role::Coordinates, Kind::Face) => self.read_coordinates(property.scalar, count)?,
+                (Role::Material | Role::Image | Role::Patch | Role::Colour(_), Kind::Face) => {
                     let number = self.body.number(property.scalar)?;
                     self.note(property, number);
                 }
@@ -200,17 +228,27 @@ impl PlyReader {
         let face = &mut self.face;
         match property.role {
             Role::Material => face.index = number as u32,
+            Role::Image => face.image = Some(number as i64),
             Role::Patch => face.is_patch = number != 0.0,
             Role::Colour(channel) => {
                 let colour = face.colour.get_or_insert(WHITE);
                 colour[channel] = property.scalar.channel(number);
             }
-            Role::Coordinate(_) | Role::Indices | Role::Other => {}
+            Role::Coordinate(_)
+            | Role::Texture(_)
+            | Role::Normal
+            | Role::Coordinates
+            | Role::Indices
+            | Role::Other => {}
         }
     }
 
     fn close_face(&mut self) -> Result<(), IoError> {
         let polygon = self.next_polygon()?;
+        for (corner, uv) in self.coordinates.as_chunks::<2>().0.iter().enumerate() {
+            self.polygon.set_uv(corner, uv.map(|number| number as f32));
+        }
+        self.coordinates.clear();
         let face = std::mem::take(&mut self.face);
         let material = match &mut self.materials {
             Some(materials) => materials.number(self.body.input().path(), face)?,
@@ -263,6 +301,21 @@ impl PlyReader {
         Ok(())
     }
 
+    /// Reads the texture coordinates of a face's corners; it has no more corners than these.
+    fn read_coordinates(&mut self, scalar: Scalar, count: u64) -> Result<(), IoError> {
+        self.coordinates.clear();
+        let mut left = count;
+        while left > 0 {
+            let mut numbers = std::mem::take(&mut self.indices);
+            self.body.numbers(scalar, left, &mut numbers)?;
+            left -= numbers.len() as u64;
+            let room = (2 * MOST_CORNERS).saturating_sub(self.coordinates.len());
+            self.coordinates.extend(numbers.iter().take(room));
+            self.indices = numbers;
+        }
+        Ok(())
+    }
+
     #[inline]
     fn push_corner(&mut self, vertex: u32) -> Result<(), IoError> {
         let position = self.positions.get(u64::from(vertex))?;
@@ -270,7 +323,11 @@ impl PlyReader {
             Some(colours) => colours.get(u64::from(vertex))?,
             None => WHITE,
         };
-        let corner = Corner { vertex, colour, ..Corner::default() };
+        let uv = match &mut self.vertex_uvs {
+            Some(uvs) => uvs.get(u64::from(vertex))?,
+            None => [0.0; 2],
+        };
+        let corner = Corner { vertex, uv, colour };
         self.polygon.push(self.body.input().path(), position, corner)
     }
 
@@ -309,6 +366,10 @@ impl MeshSource for PlyReader {
             Some(materials) if u64::from(number) < materials.count() => materials.get(number),
             _ => Ok(Material::default()),
         }
+    }
+
+    fn has_normals(&self) -> bool {
+        self.header.has_normals()
     }
 
     fn discarded(&self) -> Discarded {

@@ -2,37 +2,48 @@
 //!
 //! Faces wait in a scratch file until all vertices are there; the head of the header has a fixed
 //! size and gets its counts at the end. Where there are materials, each face has the number of its
-//! own and its colour; comments of the header say what the numbers stand for. Memory: two buffers,
-//! and the colours, spilled beyond a share.
+//! own and its colour; comments of the header say what the numbers stand for. Texture coordinates
+//! stand in a list `texcoord` of each face, with `texnumber`, the number of its image among the
+//! comments `TextureFile`, or -1; colours with every vertex. Normals are not held. Memory: two
+//! buffers, the vertices of one call, and what is known of materials, spilled beyond a share.
 
 use std::path::Path;
 
 use crate::io::error::IoError;
 use crate::io::output::{Aside, FACES, Output};
-use crate::io::output_names::OutputNames;
-use crate::io::{Palette, WriteOptions};
-use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
-use crate::store::{Scratch, Table};
+use crate::io::palette::Looks;
+use crate::io::ply::paint::Paints;
+use crate::io::polygon::WHITE;
+use crate::io::{Format, WriteOptions};
+use crate::mesh::{
+    Attributes, CornerForm, MeshSink, SinkState, SinkStats, SinkTriangles, VertexValues,
+};
+use crate::store::Scratch;
 
 /// Room for any two counts.
-const HEAD_BYTES: usize = 448;
-/// Three coordinates.
-const VERTEX_BYTES: usize = 24;
-/// Length of the list and three indices.
-const FACE_BYTES: usize = 13;
-/// Number of the material, colour, and whether it is a patch.
-const SURFACE_BYTES: usize = 9;
-/// Vertices or faces that are handed on at a time.
-const BLOCK: usize = 128;
-/// Memory for colours.
-const COLOUR_SHARE_BYTES: u64 = 64 << 10;
+const HEAD_BYTES: usize = 640;
+/// The longest that the record of a face gets.
+const MOST_FACE_BYTES: usize = 13 + 25 + 4 + 9;
+
+/// Which properties there are besides positions and corners.
+#[derive(Clone, Copy, Debug)]
+struct Layout {
+    has_colours: bool,
+    has_uvs: bool,
+    has_textures: bool,
+    has_surfaces: bool,
+}
 
 /// Writes vertices at once and lays faces aside.
 pub(crate) struct PlyWriter {
     output: Output,
     faces: Aside,
-    /// Colours by material, where faces have any.
-    colours: Option<Table<[u8; 4]>>,
+    attributes: Attributes,
+    /// What faces are painted with, where they have materials.
+    paints: Option<Paints>,
+    looks: Looks,
+    /// Vertices of the last call, while their colours may come.
+    pending: Vec<[f64; 3]>,
     vertices: u64,
     triangles: u64,
 }
@@ -44,18 +55,15 @@ impl PlyWriter {
         options: &WriteOptions,
     ) -> Result<Self, IoError> {
         let faces = Aside::create(scratch, FACES)?;
-        let mut output = Output::create(path, scratch)?;
-        output.write(&head(0, 0, options.palette.is_some()))?;
+        let output = Output::create(path, scratch)?;
+        let mut writer = Self::new((output, faces), scratch, options, &SinkState::default())?;
+        let head = head(0, 0, writer.layout());
+        writer.output.write(&head)?;
         if let Some(palette) = &options.palette {
-            let mut names = OutputNames::new(palette, scratch)?;
-            palette.for_each(|number, _| {
-                let name = names.name(Surface::new(number, false))?;
-                output.write(format!("comment material {number} {name}\n").as_bytes())
-            })?;
+            Paints::declare(palette, options, scratch, &mut writer.output)?;
         }
-        output.write(b"end_header\n")?;
-        let colours = colours_of(options, scratch)?;
-        Ok(Self { output, faces, colours, vertices: 0, triangles: 0 })
+        writer.output.write(b"end_header\n")?;
+        Ok(writer)
     }
 
     /// Goes on where an earlier writer was.
@@ -67,40 +75,68 @@ impl PlyWriter {
     ) -> Result<Self, IoError> {
         let output = Output::reopen(path, scratch, &state.output)?;
         let faces = Aside::reopen(scratch, FACES, &state.aside)?;
-        let colours = colours_of(options, scratch)?;
+        Self::new((output, faces), scratch, options, state)
+    }
+
+    fn new(
+        (output, faces): (Output, Aside),
+        scratch: &Scratch,
+        options: &WriteOptions,
+        state: &SinkState,
+    ) -> Result<Self, IoError> {
+        let palette = options.palette.as_ref();
         let SinkState { vertices, triangles, .. } = *state;
-        Ok(Self { output, faces, colours, vertices, triangles })
+        Ok(Self {
+            output,
+            faces,
+            attributes: options.attributes.and(Format::Ply.attributes()),
+            paints: palette.map(|palette| Paints::of(palette, options, scratch)).transpose()?,
+            looks: palette.map(|palette| palette.looks()).transpose()?.unwrap_or_default(),
+            pending: Vec::new(),
+            vertices,
+            triangles,
+        })
     }
 
-    /// Lays faces aside that have a surface each.
-    fn coloured(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
-        let Some(colours) = &mut self.colours else { return Ok(()) };
-        for (triangle, surface) in triangles.indices.iter().zip(triangles.surfaces) {
-            let mut bytes = [3; FACE_BYTES + SURFACE_BYTES];
-            for (index, bytes) in triangle.iter().zip(bytes[1..].as_chunks_mut::<4>().0) {
-                *bytes = index.to_le_bytes();
-            }
-            let material = surface.material();
-            bytes[FACE_BYTES..][..4].copy_from_slice(&material.to_le_bytes());
-            bytes[FACE_BYTES + 4..][..4].copy_from_slice(&colours.get(material.into())?);
-            bytes[FACE_BYTES + 8] = surface.is_patch().into();
-            self.faces.write(&bytes)?;
+    fn layout(&self) -> Layout {
+        Layout {
+            has_colours: self.attributes.colours,
+            has_uvs: self.attributes.uvs,
+            has_textures: self.attributes.uvs
+                && self.paints.as_ref().is_some_and(|paints| paints.has_textures),
+            has_surfaces: self.paints.is_some(),
         }
-        Ok(())
     }
 
-    /// Lays faces aside that have no surface.
-    fn plain(&mut self, indices: &[[u32; 3]]) -> Result<(), IoError> {
-        let mut bytes = [3; BLOCK * FACE_BYTES];
-        for block in indices.chunks(BLOCK) {
-            for (triangle, bytes) in block.iter().zip(bytes.as_chunks_mut::<FACE_BYTES>().0) {
-                for (index, bytes) in triangle.iter().zip(bytes[1..].as_chunks_mut::<4>().0) {
-                    *bytes = index.to_le_bytes();
-                }
-            }
-            self.faces.write(&bytes[..block.len() * FACE_BYTES])?;
+    /// Writes the vertices that wait, white where no colour came.
+    fn write_pending(&mut self, colours: &[[u8; 4]]) -> Result<(), IoError> {
+        for (at, position) in self.pending.iter().enumerate() {
+            let mut bytes = [0; 28];
+            write_position(&mut bytes, position);
+            bytes[24..].copy_from_slice(colours.get(at).unwrap_or(&WHITE));
+            self.output.write(&bytes)?;
         }
+        self.pending.clear();
         Ok(())
+    }
+}
+
+fn write_position(bytes: &mut [u8], position: &[f64; 3]) {
+    for (number, bytes) in position.iter().zip(bytes.as_chunks_mut::<8>().0) {
+        *bytes = number.to_le_bytes();
+    }
+}
+
+/// The record of a face, as it grows.
+struct FaceBytes {
+    bytes: [u8; MOST_FACE_BYTES],
+    length: usize,
+}
+
+impl FaceBytes {
+    fn push(&mut self, bytes: &[u8]) {
+        self.bytes[self.length..][..bytes.len()].copy_from_slice(bytes);
+        self.length += bytes.len();
     }
 }
 
@@ -111,26 +147,56 @@ impl MeshSink for PlyWriter {
         false
     }
 
+    fn corner_form(&self) -> CornerForm {
+        if self.attributes.any() { CornerForm::OfCorners } else { CornerForm::None }
+    }
+
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
         self.vertices += positions.len() as u64;
-        let mut bytes = [0; BLOCK * VERTEX_BYTES];
-        for block in positions.chunks(BLOCK) {
-            let numbers = block.as_flattened().iter();
-            for (number, bytes) in numbers.zip(bytes.as_chunks_mut::<8>().0) {
-                *bytes = number.to_le_bytes();
-            }
-            self.output.write(&bytes[..block.len() * VERTEX_BYTES])?;
+        if self.attributes.colours {
+            self.write_pending(&[])?;
+            self.pending.extend_from_slice(positions);
+            return Ok(());
+        }
+        for position in positions {
+            let mut bytes = [0; 24];
+            write_position(&mut bytes, position);
+            self.output.write(&bytes)?;
         }
         Ok(())
     }
 
+    fn vertex_values(&mut self, values: &VertexValues) -> Result<(), IoError> {
+        self.write_pending(values.colours)
+    }
+
     fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
+        self.write_pending(&[])?;
         self.triangles += triangles.indices.len() as u64;
-        if self.colours.is_some() {
-            self.coloured(triangles)
-        } else {
-            self.plain(triangles.indices)
+        let layout = self.layout();
+        let surfaces = self.looks.materials_of(triangles.surfaces)?;
+        for (at, triangle) in triangles.indices.iter().enumerate() {
+            let mut face = FaceBytes { bytes: [0; MOST_FACE_BYTES], length: 0 };
+            face.push(&[3]);
+            triangle.iter().for_each(|index| face.push(&index.to_le_bytes()));
+            if layout.has_uvs {
+                face.push(&[6]);
+                let uvs = triangles.uvs.values.get(at).copied().unwrap_or_default();
+                uvs.as_flattened().iter().for_each(|number| face.push(&number.to_le_bytes()));
+            }
+            if let Some(paints) = &mut self.paints {
+                let surface = surfaces.get(at).copied().unwrap_or_default();
+                let paint = paints.get(surface.material())?;
+                if layout.has_textures {
+                    face.push(&paint.texture.to_le_bytes());
+                }
+                face.push(&surface.material().to_le_bytes());
+                face.push(&paint.colour);
+                face.push(&[surface.is_patch().into()]);
+            }
+            self.faces.write(&face.bytes[..face.length])?;
         }
+        Ok(())
     }
 
     fn bytes_so_far(&self) -> u64 {
@@ -138,47 +204,46 @@ impl MeshSink for PlyWriter {
     }
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
+        self.write_pending(&[])?;
         let (output, aside) = (self.output.state()?, self.faces.state()?);
         let Self { vertices, triangles, .. } = *self;
         Ok(SinkState { vertices, triangles, output, aside, ..SinkState::default() })
     }
 
-    fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
-        let Self { mut output, faces, colours, vertices, triangles } = *self;
+    fn finish(mut self: Box<Self>) -> Result<SinkStats, IoError> {
+        self.write_pending(&[])?;
+        let layout = self.layout();
+        let Self { mut output, faces, vertices, triangles, .. } = *self;
         output.append(faces)?;
-        output.patch(&head(vertices, triangles, colours.is_some()), 0)?;
+        output.patch(&head(vertices, triangles, layout), 0)?;
         let file = output.finish()?;
         Ok(SinkStats { vertices, triangles, file })
     }
 }
 
-fn colours_of(
-    options: &WriteOptions,
-    scratch: &Scratch,
-) -> Result<Option<Table<[u8; 4]>>, IoError> {
-    let read = |palette: &Palette| {
-        let mut colours = Table::new(scratch, COLOUR_SHARE_BYTES);
-        palette.for_each(|_, material| Ok(colours.push(material.rgba())?))?;
-        Ok(colours)
-    };
-    options.palette.as_ref().map(read).transpose()
-}
-
 /// The header but for its last lines, filled up to a fixed size in a comment.
-fn head(vertices: u64, triangles: u64, with_surfaces: bool) -> Vec<u8> {
+fn head(vertices: u64, triangles: u64, layout: Layout) -> Vec<u8> {
+    const COLOUR: &str = "property uchar red\nproperty uchar green\nproperty uchar blue\n\
+                          property uchar alpha\n";
     let head = "ply\nformat binary_little_endian 1.0\ncomment brickmend";
-    let surface = if with_surfaces {
-        "property uint material_index\nproperty uchar red\nproperty uchar green\n\
-         property uchar blue\nproperty uchar alpha\nproperty uchar patch\n"
-    } else {
-        ""
-    };
-    let tail = format!(
-        "\nelement vertex {vertices}\n\
-         property double x\nproperty double y\nproperty double z\n\
-         element face {triangles}\n\
-         property list uchar uint vertex_indices\n{surface}"
+    let mut tail = format!(
+        "\nelement vertex {vertices}\nproperty double x\nproperty double y\nproperty double z\n"
     );
+    if layout.has_colours {
+        tail.push_str(COLOUR);
+    }
+    tail.push_str(&format!("element face {triangles}\nproperty list uchar uint vertex_indices\n"));
+    if layout.has_uvs {
+        tail.push_str("property list uchar float texcoord\n");
+    }
+    if layout.has_textures {
+        tail.push_str("property int texnumber\n");
+    }
+    if layout.has_surfaces {
+        tail.push_str("property uint material_index\n");
+        tail.push_str(COLOUR);
+        tail.push_str("property uchar patch\n");
+    }
     let room = HEAD_BYTES - tail.len();
     format!("{head:<room$}{tail}").into_bytes()
 }
@@ -190,12 +255,16 @@ mod tests {
     #[test]
     fn the_head_has_one_size_for_all_counts() {
         for count in [0, 7, u64::MAX] {
-            for with_surfaces in [false, true] {
-                let head = head(count, count, with_surfaces);
+            for has in [false, true] {
+                let layout =
+                    Layout { has_colours: has, has_uvs: has, has_textures: has, has_surfaces: has };
+                let head = head(count, count, layout);
                 assert_eq!(head.len(), HEAD_BYTES);
                 let text = String::from_utf8(head).expect("text");
                 assert!(text.contains(&format!("\nelement vertex {count}\n")));
-                assert!(text.starts_with("ply\nformat binary_little_endian 1.0\n"));
+                assert!(
+                    text.starts_with("ply\nformat binary_little_endian 1.0\ncomment brickmend")
+                );
             }
         }
     }

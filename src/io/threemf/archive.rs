@@ -44,6 +44,8 @@ pub(super) struct Archive {
     /// Bytes of the members that were opened, packed and unpacked.
     packed_bytes: u64,
     unpacked_bytes: u64,
+    /// Bytes of the user's file that were read.
+    consumed_bytes: Arc<AtomicU64>,
 }
 
 impl Archive {
@@ -52,7 +54,9 @@ impl Archive {
         check_end(&mut input)?;
         let (path, size_bytes) = (input.path().to_path_buf(), input.size_bytes());
         let budget = Arc::new(AtomicU64::new(MOST_DIRECTORY_BYTES));
-        let bytes = Bytes { input, budget: Arc::clone(&budget) };
+        let consumed_bytes = Arc::new(AtomicU64::new(0));
+        let consumed = Arc::clone(&consumed_bytes);
+        let bytes = Bytes { input, budget: Arc::clone(&budget), consumed };
         // A fixed offset: no search through the file, whose finds would be held in memory.
         let config = Config { archive_offset: ArchiveOffset::Known(0) };
         let zip = ZipArchive::with_config(config, bytes).map_err(|error| {
@@ -64,7 +68,15 @@ impl Archive {
             members.entry(part_key(&String::from_utf8_lossy(name))).or_insert(number);
         }
         let members = Arc::new(members);
-        Ok(Self { path, zip, members, size_bytes, packed_bytes: 0, unpacked_bytes: 0 })
+        Ok(Self {
+            path,
+            zip,
+            members,
+            size_bytes,
+            packed_bytes: 0,
+            unpacked_bytes: 0,
+            consumed_bytes,
+        })
     }
 
     pub(super) fn path(&self) -> &Path {
@@ -92,9 +104,9 @@ impl Archive {
         })
     }
 
-    /// Bytes of the user's file that were read, at the end.
-    pub(super) fn into_bytes_read(self) -> u64 {
-        self.zip.into_inner().input.bytes_read()
+    /// Bytes of the user's file that were read so far.
+    pub(super) fn bytes_read(&self) -> u64 {
+        self.consumed_bytes.load(Ordering::Relaxed)
     }
 }
 
@@ -124,6 +136,7 @@ struct Bytes {
     input: Input,
     /// How much may still be read.
     budget: Arc<AtomicU64>,
+    consumed: Arc<AtomicU64>,
 }
 
 impl Read for Bytes {
@@ -142,6 +155,7 @@ impl Read for Bytes {
         self.budget.store(left - count as u64, Ordering::Relaxed);
         bytes[..count].copy_from_slice(&available[..count]);
         self.input.consume(count);
+        self.consumed.store(self.input.bytes_read(), Ordering::Relaxed);
         Ok(count)
     }
 }

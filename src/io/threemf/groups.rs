@@ -17,11 +17,15 @@ pub(super) struct GroupParser {
     ingredients: Vec<u32>,
     /// The first layer of multiproperties that has materials, and which one it is.
     layer: Option<(usize, Group)>,
+    /// The first that has texture coordinates, likewise.
+    texture_layer: Option<(usize, Group)>,
+    /// The material of an image whose coordinates are listed.
+    texture: u32,
 }
 
 impl GroupParser {
     pub(super) fn new(part: u32) -> Self {
-        Self { part, ingredients: Vec::new(), layer: None }
+        Self { part, ingredients: Vec::new(), layer: None, texture_layer: None, texture: NOTHING }
     }
 
     /// Takes a tag, if it belongs to a group.
@@ -32,21 +36,24 @@ impl GroupParser {
         tag: &Tag,
     ) -> Result<(), IoError> {
         match element {
-            Element::BaseMaterials | Element::ColourGroup => {
-                self.define(scene, tag, Kind::Materials)
+            Element::BaseMaterials => self.define(scene, tag, Kind::Materials, false),
+            Element::ColourGroup => self.define(scene, tag, Kind::Materials, true),
+            Element::Texture => self.texture(scene, tag),
+            Element::TextureGroup => {
+                self.texture_group(scene, tag)?;
+                self.define(scene, tag, Kind::Bare, false)
             }
-            Element::TextureGroup => self.define(scene, tag, Kind::Bare),
             Element::Composites => {
                 self.composites(scene, tag)?;
-                self.define(scene, tag, Kind::Materials)
+                self.define(scene, tag, Kind::Materials, false)
             }
             Element::Multiproperties => {
                 self.multiproperties(scene, tag)?;
-                self.define(scene, tag, Kind::Materials)
+                self.define(scene, tag, Kind::Materials, false)
             }
-            Element::Resource => self.define(scene, tag, Kind::Foreign),
+            Element::Resource => self.define(scene, tag, Kind::Foreign, false),
             Element::Base | Element::Colour => base(scene, tag),
-            Element::TextureCoordinate => Ok(scene.properties.push(NOTHING)?),
+            Element::TextureCoordinate => self.coordinate(scene, tag),
             Element::Composite => self.composite(scene, tag),
             Element::Multi => self.multi(scene, tag),
             _ => Ok(()),
@@ -54,7 +61,13 @@ impl GroupParser {
     }
 
     /// Starts a group, or what has no more than an id.
-    fn define(&self, scene: &mut Scene, tag: &Tag, kind: Kind) -> Result<(), IoError> {
+    fn define(
+        &self,
+        scene: &mut Scene,
+        tag: &Tag,
+        kind: Kind,
+        is_colours: bool,
+    ) -> Result<(), IoError> {
         let mut id = None;
         tag.attributes(|space, name, value| {
             // An element that is none of ours may have an id that is no number.
@@ -68,7 +81,7 @@ impl GroupParser {
         })?;
         let row = match kind {
             Kind::Foreign => 0,
-            _ => scene.properties.start_group()?,
+            _ => scene.properties.start_group(is_colours)?,
         };
         let Some(id) = id else {
             return match kind {
@@ -78,6 +91,58 @@ impl GroupParser {
         };
         let resource = scene.resource_number(self.part, id, tag.at)?;
         scene.define(resource, kind, row, tag.at)
+    }
+
+    /// An image, by the name of its part.
+    fn texture(&self, scene: &mut Scene, tag: &Tag) -> Result<(), IoError> {
+        let (mut id, mut path) = (None, String::new());
+        tag.attributes(|space, name, value| {
+            match (space, name) {
+                (Space::None, "id") => id = value.trim_ascii().parse().ok(),
+                (Space::None, "path") => value.clone_into(&mut path),
+                _ => {}
+            }
+            Ok(())
+        })?;
+        let Some(id) = id else { return Ok(()) };
+        let image = scene.images.number(path.as_bytes())?;
+        let resource = scene.resource_number(self.part, id, tag.at)?;
+        scene.define(resource, Kind::Texture, image, tag.at)
+    }
+
+    /// Notes which image the coordinates of a group are of.
+    fn texture_group(&mut self, scene: &mut Scene, tag: &Tag) -> Result<(), IoError> {
+        let mut id: Option<u32> = None;
+        tag.attributes(|space, name, value| {
+            if (space, name) == (Space::None, "texid") {
+                id = value.trim_ascii().parse().ok();
+            }
+            Ok(())
+        })?;
+        let image = match id {
+            Some(id) => scene.image(self.part, id)?,
+            None => None,
+        };
+        self.texture = match image {
+            Some(image) => scene.properties.define("", None, Some(image))?,
+            None => NOTHING,
+        };
+        Ok(())
+    }
+
+    fn coordinate(&self, scene: &mut Scene, tag: &Tag) -> Result<(), IoError> {
+        let mut uv = [0.0; 2];
+        tag.attributes(|space, name, value| {
+            let axis = match (space, name) {
+                (Space::None, "u") => 0,
+                (Space::None, "v") => 1,
+                _ => return Ok(()),
+            };
+            // A coordinate that is none costs the triangle its image's place, never the model.
+            uv[axis] = parse_number(value.trim_ascii().as_bytes()).unwrap_or_default() as f32;
+            Ok(())
+        })?;
+        Ok(scene.properties.push(self.texture, Some(uv))?)
     }
 
     fn composites(&mut self, scene: &mut Scene, tag: &Tag) -> Result<(), IoError> {
@@ -120,7 +185,7 @@ impl GroupParser {
             }
             Ok(())
         })?;
-        Ok(scene.properties.push(definition)?)
+        Ok(scene.properties.push(definition, None)?)
     }
 
     fn multiproperties(&mut self, scene: &mut Scene, tag: &Tag) -> Result<(), IoError> {
@@ -131,10 +196,14 @@ impl GroupParser {
             }
             Ok(())
         })?;
-        self.layer = None;
+        (self.layer, self.texture_layer) = (None, None);
         for (layer, id) in ids.into_iter().enumerate() {
-            let group = self.group(scene, tag, id)?;
-            self.layer = self.layer.or(group.map(|group| (layer, group)));
+            let resource = scene.resource_number(self.part, id, tag.at)?;
+            let group = scene.group_of(resource)?.map(|group| (layer, group));
+            match scene.resource(resource)?.kind() {
+                Kind::Bare => self.texture_layer = self.texture_layer.or(group),
+                _ => self.layer = self.layer.or(group),
+            }
         }
         Ok(())
     }
@@ -156,7 +225,15 @@ impl GroupParser {
             }
             None => NOTHING,
         };
-        Ok(scene.properties.push(definition)?)
+        let Some((layer, group)) = self.texture_layer else {
+            return Ok(scene.properties.push(definition, None)?);
+        };
+        let index = indices.get(layer).copied().unwrap_or_default();
+        let texture = scene.properties.definition(group, index.into())?;
+        let texture = texture.ok_or_else(|| wild_property(tag, index))?;
+        let uv = scene.properties.uv(group, index.into())?;
+        let definition = scene.properties.with_image(definition, texture)?;
+        Ok(scene.properties.push(definition, Some(uv))?)
     }
 
     /// The group of a resource that has materials; others, or one further down, give none.
@@ -183,8 +260,8 @@ fn base(scene: &mut Scene, tag: &Tag) -> Result<(), IoError> {
         Ok(())
     })?;
     let title = title.or(colour.map(colour_name)).unwrap_or_default();
-    let definition = scene.properties.define(&title, colour)?;
-    Ok(scene.properties.push(definition)?)
+    let definition = scene.properties.define(&title, colour, None)?;
+    Ok(scene.properties.push(definition, None)?)
 }
 
 fn wild_property(tag: &Tag, index: u32) -> IoError {

@@ -1,11 +1,14 @@
 //! 3MF: a zip archive of XML parts. Core, and of the extensions: materials and production.
 
 mod archive;
+mod bases;
 mod groups;
 #[cfg(test)]
 mod hostile_tests;
 mod instances;
 mod model;
+mod package;
+mod paint;
 mod part_name;
 mod properties;
 mod reader;

@@ -187,7 +187,7 @@ impl<'s> ModelParser<'s> {
 
     fn triangle(&mut self, tag: &Tag) -> Result<(), IoError> {
         let mut vertices = [None; 3];
-        let (mut pid, mut property) = (None, None);
+        let (mut pid, mut property, mut others) = (None, None, [None; 2]);
         tag.attributes(|space, name, value| {
             let corner = match (space, name) {
                 (Space::None, "v1") => 0,
@@ -199,6 +199,15 @@ impl<'s> ModelParser<'s> {
                 }
                 (Space::None, "p1") => {
                     property = Some(parse_id(tag, value)?);
+                    return Ok(());
+                }
+                // Those that are no numbers were never looked at by many readers.
+                (Space::None, "p2") => {
+                    others[0] = value.trim_ascii().parse().ok();
+                    return Ok(());
+                }
+                (Space::None, "p3") => {
+                    others[1] = value.trim_ascii().parse().ok();
                     return Ok(());
                 }
                 _ => return Ok(()),
@@ -213,11 +222,18 @@ impl<'s> ModelParser<'s> {
         let stated = pid.map(|id| self.property_resource(id, tag.at)).transpose()?;
         let default = self.object.as_ref().map(|open| open.property).unwrap_or_default();
         let resource = stated.or(default.resource);
-        let (resource, property) = match (resource, property.or(default.property)) {
-            (Some(resource), Some(property)) => (resource + 1, property),
-            _ => (0, 0),
-        };
-        Ok(self.scene.faces.push(Face { vertices: [a, b, c], resource, property })?)
+        let mut face = Face { vertices: [a, b, c], resource: 0, properties: [0; 3] };
+        if let (Some(resource), Some(first)) = (resource, property.or(default.property)) {
+            // Corners have properties of their own where the first has one.
+            let [second, third] = others.map(|other| other.filter(|_| property.is_some()));
+            face.resource = resource + 1;
+            face.properties = [first, second.unwrap_or(first), third.unwrap_or(first)];
+            if !self.scene.has_colours && face.properties[1..] != [first; 2] {
+                let group = self.scene.group_of(resource)?;
+                self.scene.has_colours = group.is_some_and(|group| group.is_colours());
+            }
+        }
+        Ok(self.scene.faces.push(face)?)
     }
 
     /// The resource that a triangle names; mostly it is the one before.

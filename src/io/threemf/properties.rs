@@ -1,14 +1,14 @@
 //! What surfaces of a package are made of: groups of properties, and the materials in use.
 //!
 //! A base material keeps its name and colour; a colour is a material that is named by itself; a
-//! composite is its largest part; a multiproperty is the first of its layers that has a material; a
-//! texture coordinate says nothing. Materials are numbered in the order of their first use, equal
-//! ones once. Memory: the share, spilled beyond.
+//! composite is its largest part; a multiproperty is the first of its layers that has a material,
+//! with the first that has an image; a texture coordinate is a material of its image. Materials are
+//! numbered in the order of their first use, equal ones once. Memory: the share, spilled beyond.
 
 use bytemuck::{Pod, Zeroable};
 
 use crate::io::error::IoError;
-use crate::mesh::Material;
+use crate::mesh::{Image, Material, Texture};
 use crate::store::{Dictionary, Scratch, StoreError, Table};
 
 /// The number of the definition that says nothing.
@@ -20,15 +20,33 @@ pub(super) const NOTHING: u32 = 0;
 pub(super) struct Group {
     first: u64,
     pub(super) count: u64,
+    /// 1 if all are colours.
+    is_colours: u64,
+}
+
+impl Group {
+    pub(super) fn is_colours(&self) -> bool {
+        self.is_colours != 0
+    }
+}
+
+/// What is known of a property.
+#[derive(Clone, Copy, Debug, Pod, Zeroable)]
+#[repr(C)]
+struct Entry {
+    definition: u32,
+    uv: [f32; 2],
 }
 
 /// Definitions, groups of them, and numbers for those that are used.
 pub(super) struct Properties {
-    /// Flag, red, green, blue, alpha and name of every definition.
+    /// Flag, red, green, blue, alpha, image (one more than its number; 4 bytes) and name of every
+    /// definition.
     definitions: Dictionary,
     groups: Table<Group>,
-    /// The definition of each property.
-    entries: Table<u32>,
+    entries: Table<Entry>,
+    /// Whether any has a texture coordinate.
+    pub(super) has_uvs: bool,
     /// By definition: one more than the number of its material, or 0.
     numbers: Table<u32>,
     /// By material: its definition.
@@ -36,7 +54,8 @@ pub(super) struct Properties {
 }
 
 const HAS_COLOUR: u8 = 1;
-const KEY_BYTES: usize = 5;
+const COLOUR_BYTES: usize = 5;
+const KEY_BYTES: usize = 9;
 
 impl Properties {
     pub(super) fn new(scratch: &Scratch, share_bytes: u64) -> Result<Self, StoreError> {
@@ -44,10 +63,11 @@ impl Properties {
             definitions: Dictionary::new(scratch, share_bytes / 2),
             groups: Table::new(scratch, share_bytes / 8),
             entries: Table::new(scratch, share_bytes / 8),
+            has_uvs: false,
             numbers: Table::new(scratch, share_bytes / 8),
             used: Table::new(scratch, share_bytes / 8),
         };
-        let nothing = properties.define("", None)?;
+        let nothing = properties.define("", None, None)?;
         debug_assert_eq!(nothing, NOTHING);
         Ok(properties)
     }
@@ -57,11 +77,28 @@ impl Properties {
         &mut self,
         name: &str,
         colour: Option<[u8; 4]>,
+        image: Option<u32>,
     ) -> Result<u32, StoreError> {
         let mut key = vec![if colour.is_some() { HAS_COLOUR } else { 0 }];
         key.extend(colour.unwrap_or_default());
+        key.extend(image.map_or(0, |image| image + 1).to_le_bytes());
         key.extend_from_slice(name.as_bytes());
-        let number = self.definitions.number(&key)?;
+        self.define_key(&key)
+    }
+
+    /// A definition with the image of another one, if that has any.
+    pub(super) fn with_image(&mut self, definition: u32, other: u32) -> Result<u32, StoreError> {
+        let image = self.definitions.name(other)?;
+        let mut key = self.definitions.name(definition)?;
+        let range = COLOUR_BYTES..KEY_BYTES;
+        if image[range.clone()] != [0; 4] {
+            key[range.clone()].copy_from_slice(&image[range]);
+        }
+        self.define_key(&key)
+    }
+
+    fn define_key(&mut self, key: &[u8]) -> Result<u32, StoreError> {
+        let number = self.definitions.number(key)?;
         while self.numbers.len() < self.definitions.len() {
             self.numbers.push(0)?;
         }
@@ -69,17 +106,41 @@ impl Properties {
     }
 
     /// Starts a group; its number.
-    pub(super) fn start_group(&mut self) -> Result<u32, StoreError> {
-        self.groups.push(Group { first: self.entries.len(), count: 0 })?;
+    pub(super) fn start_group(&mut self, is_colours: bool) -> Result<u32, StoreError> {
+        let first = self.entries.len();
+        self.groups.push(Group { first, count: 0, is_colours: is_colours.into() })?;
         Ok((self.groups.len() - 1) as u32)
     }
 
-    /// Adds a property to the group that was started last.
-    pub(super) fn push(&mut self, definition: u32) -> Result<(), StoreError> {
-        self.entries.push(definition)?;
+    /// Adds a property to the group that was started last, with its texture coordinate.
+    pub(super) fn push(&mut self, definition: u32, uv: Option<[f32; 2]>) -> Result<(), StoreError> {
+        self.has_uvs |= uv.is_some();
+        self.entries.push(Entry { definition, uv: uv.unwrap_or_default() })?;
         let last = self.groups.len() - 1;
         let group = self.groups.get(last)?;
         self.groups.set(last, Group { count: group.count + 1, ..group })
+    }
+
+    /// The texture coordinate of a property; 0 where there is none.
+    pub(super) fn uv(&mut self, group: Group, index: u64) -> Result<[f32; 2], StoreError> {
+        if index < group.count {
+            return Ok(self.entries.get(group.first + index)?.uv);
+        }
+        Ok([0.0; 2])
+    }
+
+    /// The colour of a property, if it has one.
+    pub(super) fn colour(
+        &mut self,
+        group: Group,
+        index: u64,
+    ) -> Result<Option<[u8; 4]>, StoreError> {
+        let Some(definition) = self.definition(group, index)? else { return Ok(None) };
+        let key = self.definitions.name(definition)?;
+        Ok(match key[..COLOUR_BYTES] {
+            [HAS_COLOUR, r, g, b, alpha] => Some([r, g, b, alpha]),
+            _ => None,
+        })
     }
 
     pub(super) fn group(&mut self, number: u32) -> Result<Group, StoreError> {
@@ -92,7 +153,10 @@ impl Properties {
         group: Group,
         index: u64,
     ) -> Result<Option<u32>, StoreError> {
-        if index < group.count { self.entries.get(group.first + index).map(Some) } else { Ok(None) }
+        if index >= group.count {
+            return Ok(None);
+        }
+        Ok(Some(self.entries.get(group.first + index)?.definition))
     }
 
     /// The number of the material that a triangle uses.
@@ -114,10 +178,15 @@ impl Properties {
     pub(super) fn describe(&mut self, number: u32) -> Result<Material, IoError> {
         let definition = self.used.get(number.into())?;
         let key = self.definitions.name(definition)?;
-        let (colour, name) = key.split_at(KEY_BYTES);
+        let (head, name) = key.split_at(KEY_BYTES);
+        let (colour, image) = head.split_at(COLOUR_BYTES);
         let name = String::from_utf8_lossy(name).into_owned();
+        let image = u32::from_le_bytes(image.try_into().expect("four bytes of nine"));
+        let texture = image
+            .checked_sub(1)
+            .map(|number| Texture::Inside(Image { number, ..Image::default() }));
         let &[HAS_COLOUR, r, g, b, alpha] = colour else {
-            return Ok(Material { name, ..Material::default() });
+            return Ok(Material { name, texture, ..Material::default() });
         };
         // What cannot be seen at all would be no surface: programs that write so mean no alpha.
         let is_transparent = (1..255).contains(&alpha);
@@ -126,6 +195,7 @@ impl Properties {
             transparent: is_transparent,
             diffuse: Some([r, g, b].map(|channel| f32::from(channel) / 255.0)),
             opacity: is_transparent.then(|| f32::from(alpha) / 255.0),
+            texture,
             ..Material::default()
         })
     }
@@ -173,9 +243,9 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut properties =
             Properties::new(&Scratch::new(folder.path()), 0).expect("a properties store");
-        let red = properties.define("red", Some([255, 0, 0, 51])).expect("defined");
-        let bare = properties.define("bare", None).expect("defined");
-        assert_eq!(properties.define("red", Some([255, 0, 0, 51])).expect("defined"), red);
+        let red = properties.define("red", Some([255, 0, 0, 51]), None).expect("defined");
+        let bare = properties.define("bare", None, None).expect("defined");
+        assert_eq!(properties.define("red", Some([255, 0, 0, 51]), None).expect("defined"), red);
         for (definition, number) in [(bare, 0), (red, 1), (bare, 0), (NOTHING, 2)] {
             assert_eq!(properties.material(definition).expect("numbered"), number);
         }

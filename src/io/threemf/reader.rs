@@ -2,13 +2,16 @@
 //!
 //! Each object in its place is a part. Vertices are numbered on from object to object. Numbers are
 //! in the unit of the file. Without an item to build, all objects of the root are delivered.
+//! Colours are those of vertices where any triangle has several; else they are materials.
 //! Memory: that of [`Scene`], and an eighth of the share for the names of parts; while the model is
 //! parsed a tag and a block besides.
 
+use std::io::Read;
 use std::path::PathBuf;
 
 use crate::io::error::{IoError, Place, shown};
 use crate::io::input::Input;
+use crate::io::polygon::WHITE;
 use crate::io::threemf::archive::{Archive, Members};
 use crate::io::threemf::instances::{Instance, Totals, Walk};
 use crate::io::threemf::model::ModelParser;
@@ -19,16 +22,22 @@ use crate::io::threemf::vocabulary::{MODEL_RELATIONSHIP, Space};
 use crate::io::threemf::xml::{Markup, read_xml};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
 use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, Part, TriangleBatch};
-use crate::store::{Scratch, Table};
+use crate::store::{Scratch, ScratchFile, Table};
 
 /// Where a package says what it is.
 const RELATIONSHIPS_PART: &str = "_rels/.rels";
+/// What is handed on of an image at a time.
+const IMAGE_BLOCK_BYTES: u64 = 64 << 10;
 
 /// Reads a 3MF file in batches.
 pub(crate) struct ThreeMfReader {
     path: PathBuf,
-    /// Until the model is parsed.
+    scratch: Scratch,
+    /// Until the model is parsed, and longer where it has images.
     archive: Option<Box<Archive>>,
+    is_parsed: bool,
+    /// The image that was asked for last, unpacked, and its size.
+    unpacked: Option<(u32, ScratchFile, u64)>,
     scene: Scene,
     walk: Walk,
     totals: Totals,
@@ -65,7 +74,10 @@ impl ThreeMfReader {
         scene.part(&name, member);
         Ok(Self {
             path,
+            scratch: scratch.clone(),
             archive: Some(Box::new(archive)),
+            is_parsed: false,
+            unpacked: None,
             scene,
             walk: Walk::default(),
             totals: Totals::default(),
@@ -80,7 +92,7 @@ impl ThreeMfReader {
     }
 
     /// Parses all parts of the model and looks at every instance once.
-    fn parse(&mut self, mut archive: Archive) -> Result<(), IoError> {
+    fn parse(&mut self, mut archive: Box<Archive>) -> Result<(), IoError> {
         let members = Members::clone(archive.members());
         let mut number = 0;
         // The root names the others.
@@ -90,7 +102,8 @@ impl ThreeMfReader {
             read_xml(content, &self.path, &part.name, |markup| parser.take(&markup))?;
             number += 1;
         }
-        self.bytes_read = archive.into_bytes_read();
+        self.bytes_read = archive.bytes_read();
+        self.archive = Some(archive).filter(|_| !self.scene.images.is_empty());
         self.scene.check()?;
         self.totals = Totals::of(&mut self.scene, &self.path)?;
         Ok(())
@@ -141,21 +154,89 @@ impl ThreeMfReader {
                 part
             }
         };
-        let material = self.material_of(&face)?;
+        let mirrors = self.current.as_ref().is_some_and(|current| current.mirrors);
+        let material = self.paint(&face, mirrors, batch)?;
         batch.push(corners, part, material, polygon);
         batch.indices.push(vertices.map(|vertex| (self.vertices + vertex) as u32));
         Ok(())
     }
 
+    /// The material of a face; its texture coordinates and colours go to the batch, if the file has
+    /// any.
+    fn paint(
+        &mut self,
+        face: &Face,
+        mirrors: bool,
+        batch: &mut TriangleBatch,
+    ) -> Result<u32, IoError> {
+        let (has_uvs, has_colours) = (self.scene.properties.has_uvs, self.scene.has_colours);
+        if !has_uvs && !has_colours {
+            return self.material_of(face);
+        }
+        let group = match face.resource.checked_sub(1) {
+            Some(resource) => self.scene.group_of(resource)?,
+            None => None,
+        };
+        let mut corners = face.properties;
+        if mirrors {
+            corners.swap(1, 2);
+        }
+        let (mut uvs, mut colours) = ([[0.0; 2]; 3], [WHITE; 3]);
+        if let Some(group) = group {
+            for (at, &property) in corners.iter().enumerate() {
+                uvs[at] = self.scene.properties.uv(group, property.into())?;
+                if group.is_colours() {
+                    let colour = self.scene.properties.colour(group, property.into())?;
+                    colours[at] = colour.unwrap_or(WHITE);
+                }
+            }
+        }
+        if has_uvs {
+            batch.uvs.push(uvs);
+        }
+        if has_colours {
+            batch.colours.push(colours);
+        }
+        // Colours of vertices are no materials, unless light passes.
+        let is_plain = colours[1..] == [colours[0]; 2];
+        let is_opaque = !(is_plain && (1..255).contains(&colours[0][3]));
+        match group.filter(|group| has_colours && group.is_colours() && is_opaque) {
+            Some(_) => self.material_of(&Face { resource: 0, properties: [0; 3], ..*face }),
+            None => self.material_of(face),
+        }
+    }
+
+    /// Unpacks an image; what is missing or broken is none.
+    fn unpack_image(&mut self, number: u32) -> Result<Option<(u32, ScratchFile, u64)>, IoError> {
+        let name = self.scene.images.name(number)?;
+        let key = part_key(&String::from_utf8_lossy(&name));
+        let Some(archive) = &mut self.archive else { return Ok(None) };
+        let Some(&member) = archive.members().get(&key) else { return Ok(None) };
+        let Ok(mut content) = archive.member(member) else { return Ok(None) };
+        let file = self.scratch.anonymous("image")?;
+        let (mut block, mut size_bytes) = (vec![0; IMAGE_BLOCK_BYTES as usize], 0);
+        loop {
+            match content.read(&mut block) {
+                Ok(0) => return Ok(Some((number, file, size_bytes))),
+                Ok(count) => {
+                    file.write_at(&block[..count], size_bytes)?;
+                    size_bytes += count as u64;
+                }
+                Err(error) if error.kind() == std::io::ErrorKind::Interrupted => {}
+                Err(_) => return Ok(None),
+            }
+        }
+    }
+
     fn material_of(&mut self, face: &Face) -> Result<u32, IoError> {
-        let property = [face.resource, face.property];
+        let property = [face.resource, face.properties[0]];
         if let Some((last, material)) = self.last
             && last == property
         {
             return Ok(material);
         }
         let definition = match face.resource.checked_sub(1) {
-            Some(resource) => self.scene.definition(resource, face.property)?,
+            Some(resource) => self.scene.definition(resource, face.properties[0])?,
             None => NOTHING,
         };
         let material = self.scene.properties.material(definition)?;
@@ -173,8 +254,10 @@ impl MeshSource for ThreeMfReader {
 
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, IoError> {
         batch.clear();
-        if let Some(archive) = self.archive.take() {
-            self.parse(*archive)?;
+        if !std::mem::replace(&mut self.is_parsed, true)
+            && let Some(archive) = self.archive.take()
+        {
+            self.parse(archive)?;
         }
         while batch.len() < BATCH_TRIANGLES {
             let is_open = |c: &Current| c.next < c.instance.object.triangles;
@@ -203,6 +286,23 @@ impl MeshSource for ThreeMfReader {
 
     fn material(&mut self, number: u32) -> Result<Material, IoError> {
         self.scene.properties.describe(number)
+    }
+
+    fn image_block(
+        &mut self,
+        number: u32,
+        offset: u64,
+        bytes: &mut Vec<u8>,
+    ) -> Result<(), IoError> {
+        bytes.clear();
+        if self.unpacked.as_ref().is_none_or(|(unpacked, ..)| *unpacked != number) {
+            self.unpacked = self.unpack_image(number)?;
+        }
+        if let Some((_, file, size_bytes)) = &self.unpacked {
+            bytes.resize(size_bytes.saturating_sub(offset).min(IMAGE_BLOCK_BYTES) as usize, 0);
+            file.read_at(bytes, offset)?;
+        }
+        Ok(())
     }
 
     fn discarded(&self) -> Discarded {

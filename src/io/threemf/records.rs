@@ -1,7 +1,9 @@
 //! Vertices and triangles that wait for the end of a file, in the order in which they came.
 //!
 //! A record is its tag (one byte), then numbers with their lowest byte first: three `f64` of a
-//! vertex; three `u32` of a triangle, and a fourth where its surface is known. Memory: a record.
+//! vertex; four bytes of its colour; two `f32` of a texture coordinate; three `u32` of a triangle, a
+//! fourth where its surface is known, and three more where it has texture coordinates, by their
+//! numbers. Memory: a record.
 
 use crate::io::error::IoError;
 use crate::io::output::Aside;
@@ -10,12 +12,20 @@ use crate::mesh::Surface;
 const VERTEX: u8 = 0;
 const TRIANGLE: u8 = 1;
 const SURFACE: u8 = 2;
+const COLOUR: u8 = 3;
+const UV: u8 = 4;
+const TEXTURED: u8 = 5;
 
 /// What waits.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Record {
     Vertex([f64; 3]),
+    /// Of the vertex whose turn it is.
+    Colour([u8; 4]),
+    Uv([f32; 2]),
     Triangle([u32; 3], Option<Surface>),
+    /// The same with the numbers of its texture coordinates.
+    Textured([u32; 3], Surface, [u32; 3]),
 }
 
 impl Record {
@@ -25,6 +35,19 @@ impl Record {
             Self::Vertex(position) => {
                 bytes.push(VERTEX);
                 bytes.extend(position.iter().flat_map(|number| number.to_le_bytes()));
+            }
+            Self::Colour(colour) => {
+                bytes.push(COLOUR);
+                bytes.extend(colour);
+            }
+            Self::Uv(uv) => {
+                bytes.push(UV);
+                bytes.extend(uv.iter().flat_map(|number| number.to_le_bytes()));
+            }
+            Self::Textured(indices, surface, uvs) => {
+                bytes.push(TEXTURED);
+                let numbers = indices.into_iter().chain([surface.bits()]).chain(uvs);
+                bytes.extend(numbers.flat_map(u32::to_le_bytes));
             }
             Self::Triangle(indices, surface) => {
                 bytes.push(if surface.is_some() { SURFACE } else { TRIANGLE });
@@ -51,9 +74,16 @@ impl Record {
                 Some((Self::Vertex(position), 25))
             }
             TRIANGLE => Some((Self::Triangle(triangle()?, None), 13)),
-            _ => {
+            COLOUR => Some((Self::Colour(index(0)?.to_le_bytes()), 5)),
+            UV => Some((Self::Uv([index(0)?, index(1)?].map(f32::from_bits)), 9)),
+            SURFACE => {
                 let surface = Surface::from_bits(index(3)?);
                 Some((Self::Triangle(triangle()?, Some(surface)), 17))
+            }
+            _ => {
+                let surface = Surface::from_bits(index(3)?);
+                let uvs = [index(4)?, index(5)?, index(6)?];
+                Some((Self::Textured(triangle()?, surface, uvs), 29))
             }
         }
     }
@@ -95,7 +125,10 @@ mod tests {
     fn records_come_back_across_blocks() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let mut aside = Aside::create(&Scratch::new(folder.path()), FACES).expect("a file");
-        let record = |i: u32| match i % 3 {
+        let record = |i: u32| match i % 6 {
+            3 => Record::Colour(i.to_be_bytes()),
+            4 => Record::Uv([i as f32, -0.25]),
+            5 => Record::Textured([i, 1, 2], Surface::new(i, true), [3, i, u32::MAX]),
             0 => Record::Vertex([f64::from(i), -0.5, 1e300]),
             1 => Record::Triangle([i, 1, u32::MAX], None),
             _ => Record::Triangle([i, 1, 2], Some(Surface::new(i, i.is_multiple_of(2)))),

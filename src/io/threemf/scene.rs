@@ -24,8 +24,10 @@ pub(super) enum Kind {
     Object,
     /// A group of properties that have materials or colours.
     Materials,
-    /// A group of properties that have none.
+    /// A group of properties that have none, but may have texture coordinates.
     Bare,
+    /// An image.
+    Texture,
     /// None of ours.
     Foreign,
 }
@@ -43,7 +45,8 @@ pub(super) struct Resource {
     is_component: u32,
 }
 
-const KINDS: [Kind; 5] = [Kind::Missing, Kind::Object, Kind::Materials, Kind::Bare, Kind::Foreign];
+const KINDS: [Kind; 6] =
+    [Kind::Missing, Kind::Object, Kind::Materials, Kind::Bare, Kind::Texture, Kind::Foreign];
 
 impl Resource {
     pub(super) fn kind(&self) -> Kind {
@@ -80,7 +83,8 @@ pub(super) struct Face {
     pub(super) vertices: [u32; 3],
     /// One more than the resource that its property is in; 0 where it has none.
     pub(super) resource: u32,
-    pub(super) property: u32,
+    /// By corner; the first is the one that its material comes from.
+    pub(super) properties: [u32; 3],
 }
 
 /// An object in its place: a component, or an item of the build.
@@ -114,6 +118,10 @@ pub(super) struct Scene {
     pub(super) components: Table<Placed>,
     pub(super) items: Table<Placed>,
     pub(super) properties: Properties,
+    /// Names of the parts that images are in.
+    pub(super) images: Dictionary,
+    /// Whether any triangle has colours that differ between its corners.
+    pub(super) has_colours: bool,
 }
 
 impl Scene {
@@ -132,6 +140,8 @@ impl Scene {
             components: Table::new(scratch, share_bytes / 32),
             items: Table::new(scratch, share_bytes / 32),
             properties: Properties::new(scratch, share_bytes / 32)?,
+            images: Dictionary::new(scratch, share_bytes / 64),
+            has_colours: false,
         })
     }
 
@@ -157,6 +167,23 @@ impl Scene {
             self.resources.push(resource)?;
         }
         Ok(number)
+    }
+
+    /// The image of a resource that was defined before.
+    pub(super) fn image(&mut self, part: u32, id: u32) -> Result<Option<u32>, StoreError> {
+        let number = self.keys.find(&[part.to_le_bytes(), id.to_le_bytes()].concat())?;
+        let Some(number) = number else { return Ok(None) };
+        let resource = self.resource(number)?;
+        Ok((resource.kind() == Kind::Texture).then_some(resource.row))
+    }
+
+    /// The group of properties of a resource that was defined before.
+    pub(super) fn group_of(&mut self, resource: u32) -> Result<Option<Group>, StoreError> {
+        let Resource { row, .. } = self.resource(resource)?;
+        match self.resource(resource)?.kind() {
+            Kind::Materials | Kind::Bare => self.properties.group(row).map(Some),
+            _ => Ok(None),
+        }
     }
 
     /// Says what a resource is.
@@ -220,7 +247,7 @@ impl Scene {
                 let found = self.properties.definition(group, property.into())?;
                 found.map_or_else(|| Err(self.no_property(resource, group, property)?), Ok)
             }
-            Kind::Foreign => Ok(NOTHING),
+            Kind::Texture | Kind::Foreign => Ok(NOTHING),
             Kind::Object | Kind::Missing => {
                 let at = self.place(resource)?;
                 Err(at

@@ -121,7 +121,7 @@ fn materials_come_from_all_kinds_of_groups() {
     let triangles: String = [
         "",
         "p1='1'",
-        "pid='2' p1='0' p2='1' p3='1'",
+        "pid='2' p1='0' p2='0'",
         "pid='2' p1='1'",
         "pid='3' p1='0'",
         "pid='4' p1='1'",
@@ -148,9 +148,13 @@ fn materials_come_from_all_kinds_of_groups() {
          <object id='10' pid='1' pindex='0'>{mesh}</object>"
     );
     let content = read_model(&resources, "<item objectid='10'/>").expect("readable");
-    let names = ["A", "B", "#102030", "#10203040", "", "C"];
+    // What shows an image is another material than what does not.
+    let names = ["A", "B", "#102030", "#10203040", "", "C", "#10203040", "#102030", ""];
     assert_eq!(content.material_names(), names);
-    assert_eq!(content.batch.materials, [0, 1, 2, 3, 4, 5, 3, 2, 4, 4, 0, 0]);
+    assert_eq!(content.batch.materials, [0, 1, 2, 3, 4, 5, 6, 7, 4, 8, 0, 0]);
+    let shown: Vec<_> = content.materials.iter().map(|m| m.texture.is_some()).collect();
+    assert_eq!(shown, [false, false, false, false, true, false, true, true, false]);
+    assert!(content.batch.colours.is_empty());
     let material = |number: usize| &content.materials[number];
     assert_eq!(material(0).diffuse, Some([1.0, 0.0, 0.0]));
     assert_eq!((material(0).opacity, material(0).transparent), (None, false));
@@ -158,6 +162,29 @@ fn materials_come_from_all_kinds_of_groups() {
     assert!(material(3).transparent);
     // Programs write an alpha of 0 where they mean none.
     assert_eq!((material(5).opacity, material(5).transparent), (None, false));
+}
+
+#[test]
+fn colours_that_differ_between_corners_are_those_of_vertices() {
+    let triangle = |properties: &str| format!("<triangle v1='0' v2='1' v3='2' {properties}/>");
+    let triangles = ["pid='2' p1='0' p2='1' p3='2'", "pid='2' p1='1'", "pid='2' p1='2'", "p1='0'"]
+        .map(triangle)
+        .concat();
+    let mesh = MESH.replace("<triangles>", &format!("<triangles>{triangles}"));
+    let resources = format!(
+        "<basematerials id='1'><base name='A' displaycolor='#ff0000'/></basematerials>\
+         <m:colorgroup id='2'><m:color color='#102030'/><m:color color='#FFFFFF'/>\
+         <m:color color='#00000080'/></m:colorgroup>\
+         <object id='10' pid='1' pindex='0'>{mesh}</object>"
+    );
+    let content = read_model(&resources, "<item objectid='10'/>").expect("readable");
+    let [dark, white, glass] = [[16, 32, 48, 255], [255; 4], [0, 0, 0, 128]];
+    let expected = [[dark, white, glass], [white; 3], [glass; 3], [white; 3]];
+    assert_eq!(content.batch.colours[..4], expected);
+    // Light passes through the third, which has to be known.
+    assert_eq!(content.batch.materials[..4], [0, 0, 1, 2]);
+    assert_eq!(content.material_names(), ["", "#00000080", "A"]);
+    assert!(content.materials[1].transparent && content.batch.uvs.is_empty());
 }
 
 #[test]

@@ -4,11 +4,15 @@
 /// The relationship of a package to its model.
 pub(super) const MODEL_RELATIONSHIP: &str =
     "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dmodel";
+/// The relationship of a model to its images.
+pub(super) const TEXTURE_RELATIONSHIP: &str =
+    "http://schemas.microsoft.com/3dmanufacturing/2013/01/3dtexture";
 /// The namespace of everything in this file that has no other.
 pub(super) const CORE: &str = "http://schemas.microsoft.com/3dmanufacturing/core/2015/02";
 pub(super) const RELATIONSHIPS: &str =
     "http://schemas.openxmlformats.org/package/2006/relationships";
-const MATERIALS: &str = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02";
+/// The namespace of colours and textures.
+pub(super) const MATERIALS: &str = "http://schemas.microsoft.com/3dmanufacturing/material/2015/02";
 const PRODUCTION: &str = "http://schemas.microsoft.com/3dmanufacturing/production/2015/06";
 const TRIANGLE_SETS: &str = "http://schemas.microsoft.com/3dmanufacturing/trianglesets/2021/07";
 
@@ -53,6 +57,7 @@ pub(super) enum Element {
     Base,
     ColourGroup,
     Colour,
+    Texture,
     TextureGroup,
     TextureCoordinate,
     Composites,
@@ -92,6 +97,7 @@ impl Element {
             (Self::Resources, Space::Core, "object") => Self::Object,
             (Self::Resources, Space::Core, "basematerials") => Self::BaseMaterials,
             (Self::Resources, Space::Materials, "colorgroup") => Self::ColourGroup,
+            (Self::Resources, Space::Materials, "texture2d") => Self::Texture,
             (Self::Resources, Space::Materials, "texture2dgroup") => Self::TextureGroup,
             (Self::Resources, Space::Materials, "compositematerials") => Self::Composites,
             (Self::Resources, Space::Materials, "multiproperties") => Self::Multiproperties,

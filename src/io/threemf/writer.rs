@@ -1,42 +1,44 @@
-//! Writes 3MF: one object, one item, base materials where triangles name materials.
+//! Writes 3MF: one object, one item, and what its triangles are painted with ([`Paint`]).
 //!
 //! In the model all vertices stand before all triangles, and all of it is packed: vertices and
 //! triangles wait aside as records until the end, when the archive is written in one go. Every
-//! coordinate is the shortest text that gives its `f64` back. Memory: a few buffers.
+//! coordinate is the shortest text that gives its `f64` back. Memory: a few buffers, and that of
+//! [`Paint`] in the end.
 
 use std::path::Path;
 
-use crate::io::WriteOptions;
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
 use crate::io::output::{Aside, FACES, Output};
-use crate::io::palette::Palette;
+use crate::io::palette::{Looks, Palette};
+use crate::io::polygon::WHITE;
+use crate::io::threemf::package::{HEAD, content_types, relationships};
+use crate::io::threemf::paint::{MOST_INDICES, Paint};
 use crate::io::threemf::records::{Record, for_each_record};
-use crate::io::threemf::vocabulary::{CORE, MODEL_RELATIONSHIP, RELATIONSHIPS};
+use crate::io::threemf::vocabulary::{CORE, MATERIALS, MODEL_RELATIONSHIP};
 use crate::io::threemf::zip_file::ZipFile;
-use crate::mesh::{LengthUnit, Material, MeshSink, SinkState, SinkStats, SinkTriangles, Surface};
+use crate::io::{Format, WriteOptions};
+use crate::mesh::{
+    Attributes, CornerForm, LengthUnit, MeshSink, SinkState, SinkStats, SinkTriangles, Surface,
+    VertexValues,
+};
 use crate::store::Scratch;
 
-/// The largest number of a vertex or a material that 3MF allows, and one.
-const MOST_INDICES: u64 = 1 << 31;
 /// No record of a mesh takes more bytes in the model.
-const LONGEST_LINE_BYTES: u64 = 128;
+const LONGEST_LINE_BYTES: u64 = 160;
 /// What may stand in a model besides the mesh before its sizes would have to be large ones.
 const OTHER_BYTES: u64 = 1 << 30;
 
-const CONTENT_TYPES: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n\
-    <Types xmlns=\"http://schemas.openxmlformats.org/package/2006/content-types\">\
-    <Default Extension=\"rels\" \
-    ContentType=\"application/vnd.openxmlformats-package.relationships+xml\"/>\
-    <Default Extension=\"model\" \
-    ContentType=\"application/vnd.ms-package.3dmanufacturing-3dmodel+xml\"/></Types>\n";
-
 /// Lays records aside, and makes a file of them.
-#[derive(Debug)]
 pub(crate) struct ThreeMfWriter {
     output: Output,
     records: Aside,
+    scratch: Scratch,
     palette: Option<Palette>,
+    looks: Looks,
+    attributes: Attributes,
+    /// Vertices whose colours are laid aside.
+    coloured: u64,
     unit: LengthUnit,
     record: Vec<u8>,
     vertices: u64,
@@ -51,7 +53,7 @@ impl ThreeMfWriter {
     ) -> Result<Self, IoError> {
         let records = Aside::create(scratch, FACES)?;
         let output = Output::create(path, scratch)?;
-        Ok(Self::new((output, records), options, &SinkState::default()))
+        Self::new((output, records), (scratch, options, &SinkState::default()))
     }
 
     /// Goes on where an earlier writer was.
@@ -63,14 +65,36 @@ impl ThreeMfWriter {
     ) -> Result<Self, IoError> {
         let output = Output::reopen(path, scratch, &state.output)?;
         let records = Aside::reopen(scratch, FACES, &state.aside)?;
-        Ok(Self::new((output, records), options, state))
+        Self::new((output, records), (scratch, options, state))
     }
 
-    fn new((output, records): (Output, Aside), options: &WriteOptions, state: &SinkState) -> Self {
-        let SinkState { vertices, triangles, .. } = *state;
+    fn new(
+        (output, records): (Output, Aside),
+        (scratch, options, state): (&Scratch, &WriteOptions, &SinkState),
+    ) -> Result<Self, IoError> {
         let palette = options.palette.clone();
-        let unit = options.unit.unwrap_or_default();
-        Self { output, records, palette, unit, record: Vec::new(), vertices, triangles }
+        Ok(Self {
+            output,
+            records,
+            scratch: scratch.clone(),
+            looks: palette.as_ref().map(Palette::looks).transpose()?.unwrap_or_default(),
+            palette,
+            attributes: options.attributes.and(Format::ThreeMf.attributes()),
+            coloured: state.vertices,
+            unit: options.unit.unwrap_or_default(),
+            record: Vec::new(),
+            vertices: state.vertices,
+            triangles: state.triangles,
+        })
+    }
+
+    /// Lays colours aside up to the last vertex: white where none came.
+    fn fill_colours(&mut self) -> Result<(), IoError> {
+        while self.attributes.colours && self.coloured < self.vertices {
+            self.push(Record::Colour(WHITE))?;
+            self.coloured += 1;
+        }
+        Ok(())
     }
 
     fn push(&mut self, record: Record) -> Result<(), IoError> {
@@ -87,7 +111,28 @@ impl MeshSink for ThreeMfWriter {
         false
     }
 
+    fn corner_form(&self) -> CornerForm {
+        if self.attributes.any() { CornerForm::OfCorners } else { CornerForm::None }
+    }
+
+    fn vertex_values(&mut self, values: &VertexValues) -> Result<(), IoError> {
+        if self.attributes.colours {
+            let owed = (self.vertices - self.coloured) as usize;
+            for &colour in &values.colours[..values.colours.len().min(owed)] {
+                self.push(Record::Colour(colour))?;
+                self.coloured += 1;
+            }
+        }
+        self.fill_colours()
+    }
+
+    fn list_uvs(&mut self, uvs: &[[f32; 2]]) -> Result<(), IoError> {
+        let uvs = if self.attributes.uvs { uvs } else { &[] };
+        uvs.iter().try_for_each(|&uv| self.push(Record::Uv(uv)))
+    }
+
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
+        self.fill_colours()?;
         self.vertices += positions.len() as u64;
         if self.vertices > MOST_INDICES {
             return Err(too_large(&self.output, "vertices"));
@@ -96,12 +141,18 @@ impl MeshSink for ThreeMfWriter {
     }
 
     fn triangles(&mut self, triangles: &SinkTriangles) -> Result<(), IoError> {
-        let SinkTriangles { indices, surfaces, .. } = *triangles;
-        self.triangles += indices.len() as u64;
-        for (at, &triangle) in indices.iter().enumerate() {
+        self.triangles += triangles.indices.len() as u64;
+        let mut looks = std::mem::take(&mut self.looks);
+        let surfaces = looks.materials_of(triangles.surfaces)?;
+        for (at, &triangle) in triangles.indices.iter().enumerate() {
             let surface = surfaces.get(at).copied().filter(|_| self.palette.is_some());
-            self.push(Record::Triangle(triangle, surface))?;
+            let uvs = triangles.uvs.numbers.get(at).filter(|_| self.attributes.uvs);
+            self.push(match (surface, uvs) {
+                (Some(surface), Some(&uvs)) => Record::Textured(triangle, surface, uvs),
+                (surface, _) => Record::Triangle(triangle, surface),
+            })?;
         }
+        self.looks = looks;
         Ok(())
     }
 
@@ -110,140 +161,51 @@ impl MeshSink for ThreeMfWriter {
     }
 
     fn checkpoint(&mut self) -> Result<SinkState, IoError> {
+        self.fill_colours()?;
         let (output, aside) = (self.output.state()?, self.records.state()?);
         let Self { vertices, triangles, .. } = *self;
         Ok(SinkState { vertices, triangles, output, aside, ..SinkState::default() })
     }
 
-    fn finish(self: Box<Self>) -> Result<SinkStats, IoError> {
+    fn finish(mut self: Box<Self>) -> Result<SinkStats, IoError> {
+        self.fill_colours()?;
         let Self { output, mut records, palette, unit, vertices, triangles, .. } = *self;
-        let too_many = too_large(&output, "materials");
+        let mut paint = Paint::new(&self.scratch, palette.as_ref(), self.attributes, &mut records)?;
         let mut zip = ZipFile::new(output);
-        for (name, content) in
-            [("[Content_Types].xml", CONTENT_TYPES), ("_rels/.rels", &relationships())]
-        {
+        for (name, content) in [
+            ("[Content_Types].xml", content_types(paint.has_textures())),
+            ("_rels/.rels", relationships(MODEL_RELATIONSHIP, &["/3D/3dmodel.model".to_owned()])),
+        ] {
             zip.start(name, false)?;
             zip.write(content.as_bytes())?;
             zip.end()?;
         }
         let mesh_bytes = LONGEST_LINE_BYTES * (vertices + triangles);
-        zip.start("3D/3dmodel.model", mesh_bytes + OTHER_BYTES > u64::from(u32::MAX))?;
+        let paint_bytes = paint.longest_bytes(vertices, triangles);
+        let is_large = mesh_bytes + paint_bytes + OTHER_BYTES > u64::from(u32::MAX);
+        zip.start("3D/3dmodel.model", is_large)?;
         let unit = unit.name();
-        zip.write(format!("{HEAD}<model unit=\"{unit}\" xmlns=\"{CORE}\">\n").as_bytes())?;
+        let colours =
+            if self.attributes.any() { format!(" xmlns:m=\"{MATERIALS}\"") } else { String::new() };
+        let model = format!("{HEAD}<model unit=\"{unit}\" xmlns=\"{CORE}\"{colours}>\n");
+        zip.write(model.as_bytes())?;
         zip.write(b"<resources>\n")?;
-        let materials = match &palette {
-            Some(palette) => Materials::write(&mut zip, palette, &mut records, too_many)?,
-            None => Materials::default(),
-        };
-        write_object(&mut zip, &mut records, materials)?;
+        paint.write(&mut zip, &mut records)?;
+        write_object(&mut zip, &mut records, &mut paint)?;
         zip.write(b"</resources>\n<build>\n<item objectid=\"2\"/>\n</build>\n</model>\n")?;
         zip.end()?;
+        paint.write_images(&mut zip)?;
         let file = zip.finish()?.finish()?;
         Ok(SinkStats { vertices, triangles, file })
     }
-}
-
-const HEAD: &str = "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n";
-
-fn relationships() -> String {
-    format!(
-        "{HEAD}<Relationships xmlns=\"{RELATIONSHIPS}\"><Relationship Id=\"rel0\" \
-         Type=\"{MODEL_RELATIONSHIP}\" Target=\"/3D/3dmodel.model\"/></Relationships>\n"
-    )
 }
 
 fn too_large(output: &Output, what: &'static str) -> IoError {
     IoError::TooLarge { path: output.path().to_path_buf(), what, limit: MOST_INDICES }
 }
 
-/// How surfaces are numbered among the base materials.
-#[derive(Clone, Copy, Debug, Default)]
-struct Materials {
-    count: u64,
-    /// Whether each material is followed by one for its patches.
-    has_patches: bool,
-}
-
-impl Materials {
-    /// Writes all materials of the palette.
-    fn write(
-        zip: &mut ZipFile,
-        palette: &Palette,
-        records: &mut Aside,
-        too_many: IoError,
-    ) -> Result<Self, IoError> {
-        let mut has_patches = false;
-        for_each_record(records, |record| {
-            if let Record::Triangle(_, Some(surface)) = record {
-                has_patches |= surface.is_patch();
-            }
-            Ok(())
-        })?;
-        let (mut count, mut text) = (0, Vec::new());
-        palette.for_each(|_, material| {
-            if count == 0 {
-                zip.write(b"<basematerials id=\"1\">\n")?;
-            }
-            for ending in ["", Surface::PATCH_ENDING].into_iter().take(1 + usize::from(has_patches))
-            {
-                text.clear();
-                push_base(&mut text, &material, ending);
-                zip.write(&text)?;
-                count += 1;
-            }
-            Ok(())
-        })?;
-        if count > MOST_INDICES {
-            return Err(too_many);
-        }
-        if count > 0 {
-            zip.write(b"</basematerials>\n")?;
-        }
-        Ok(Self { count, has_patches })
-    }
-
-    /// The base material of a surface, if there is one.
-    fn index(&self, surface: Surface) -> Option<u64> {
-        let material = u64::from(surface.material());
-        let index =
-            if self.has_patches { 2 * material + u64::from(surface.is_patch()) } else { material };
-        (index < self.count).then_some(index)
-    }
-}
-
-fn push_base(text: &mut Vec<u8>, material: &Material, ending: &str) {
-    text.extend_from_slice(b"<base name=\"");
-    push_escaped(text, &material.name);
-    text.extend_from_slice(ending.as_bytes());
-    let [r, g, b, alpha] = material.rgba();
-    // Readers take no alpha for an alpha of 0, and light passes or it does not.
-    let alpha = if material.transparent { alpha.clamp(1, 254) } else { 255 };
-    let colour = format!("\" displaycolor=\"#{r:02X}{g:02X}{b:02X}{alpha:02X}\"/>\n");
-    text.extend_from_slice(colour.as_bytes());
-}
-
-/// Appends a name as the value of an attribute; what XML cannot say is replaced.
-fn push_escaped(text: &mut Vec<u8>, name: &str) {
-    for c in name.chars() {
-        match c {
-            '&' => text.extend_from_slice(b"&amp;"),
-            '<' => text.extend_from_slice(b"&lt;"),
-            '>' => text.extend_from_slice(b"&gt;"),
-            '"' => text.extend_from_slice(b"&quot;"),
-            // Numbers of characters are XML too, but not to every reader of 3MF.
-            '\t' | '\n' | '\r' => text.push(b' '),
-            '\0'..' ' | '\u{fffe}' | '\u{ffff}' => text.extend_from_slice("\u{fffd}".as_bytes()),
-            c => text.extend_from_slice(c.encode_utf8(&mut [0; 4]).as_bytes()),
-        }
-    }
-}
-
-fn write_object(
-    zip: &mut ZipFile,
-    records: &mut Aside,
-    materials: Materials,
-) -> Result<(), IoError> {
-    let property = if materials.count > 0 { " pid=\"1\" pindex=\"0\"" } else { "" };
+fn write_object(zip: &mut ZipFile, records: &mut Aside, paint: &mut Paint) -> Result<(), IoError> {
+    let property = if paint.has_bases() { " pid=\"1\" pindex=\"0\"" } else { "" };
     zip.write(format!("<object id=\"2\" type=\"model\"{property}>\n<mesh>\n").as_bytes())?;
     let mut text = Vec::new();
     zip.write(b"<vertices>\n")?;
@@ -261,21 +223,42 @@ fn write_object(
     })?;
     zip.write(b"</vertices>\n<triangles>\n")?;
     for_each_record(records, |record| {
-        let Record::Triangle(indices, surface) = record else { return Ok(()) };
+        let (indices, surface, has_uvs) = match record {
+            Record::Triangle(indices, surface) => (indices, surface, false),
+            Record::Textured(indices, surface, _) => (indices, Some(surface), true),
+            _ => return Ok(()),
+        };
         text.clear();
         text.extend_from_slice(b"<triangle");
-        for (name, index) in [b" v1=\"", b" v2=\"", b" v3=\""].into_iter().zip(indices) {
-            text.extend_from_slice(name);
-            push_count(&mut text, u64::from(index));
-            text.push(b'"');
-        }
-        if let Some(index) = surface.and_then(|surface| materials.index(surface)) {
-            text.extend_from_slice(b" pid=\"1\" p1=\"");
-            push_count(&mut text, index);
-            text.push(b'"');
-        }
+        push_numbers(&mut text, [" v1", " v2", " v3"], indices);
+        push_property(&mut text, paint, (indices, surface, has_uvs))?;
         text.extend_from_slice(b"/>\n");
         zip.write(&text)
     })?;
     zip.write(b"</triangles>\n</mesh>\n</object>\n")
+}
+
+/// Appends what a triangle is painted with.
+fn push_property(
+    text: &mut Vec<u8>,
+    paint: &mut Paint,
+    triangle: ([u32; 3], Option<Surface>, bool),
+) -> Result<(), IoError> {
+    let Some((group, properties)) = paint.property(triangle)? else { return Ok(()) };
+    push_numbers(text, [" pid"], [group]);
+    if properties[1..] == [properties[0]; 2] {
+        push_numbers(text, [" p1"], [properties[0]]);
+    } else {
+        push_numbers(text, [" p1", " p2", " p3"], properties);
+    }
+    Ok(())
+}
+
+fn push_numbers<const N: usize>(text: &mut Vec<u8>, names: [&str; N], numbers: [u32; N]) {
+    for (name, number) in names.into_iter().zip(numbers) {
+        text.extend_from_slice(name.as_bytes());
+        text.extend_from_slice(b"=\"");
+        push_count(text, number.into());
+        text.push(b'"');
+    }
 }

@@ -22,7 +22,7 @@ fn options(scratch: &Scratch, materials: &[Material]) -> WriteOptions {
     let mut palette = PaletteWriter::create(scratch).expect("a spool");
     materials.iter().for_each(|material| palette.push(material).expect("written"));
     let state = palette.finish().expect("finished");
-    WriteOptions { palette: Some(Palette::new(scratch, &state)), ..WriteOptions::default() }
+    WriteOptions { palette: Some(Palette::new(scratch, &state[0])), ..WriteOptions::default() }
 }
 
 fn read(path: &Path, scratch: &Scratch) -> Content {

@@ -4,9 +4,11 @@
 //! of the output, which may be patched, and no reader has to look for descriptors. No times:
 //! equal contents are equal bytes. Memory: two blocks, and the deflater's window.
 
+use std::path::Path;
+
 use flate2::{Compress, Compression, Crc, FlushCompress, Status};
 
-use crate::io::error::IoError;
+use crate::io::error::{IoError, Place};
 use crate::io::output::Output;
 
 const BLOCK_BYTES: usize = 64 << 10;
@@ -18,6 +20,7 @@ const LOCATOR64: &[u8] = b"PK\x06\x07";
 /// Versions that know deflate, and sizes of eight bytes.
 const VERSION: u16 = 20;
 const VERSION64: u16 = 45;
+const STORED: u16 = 0;
 const DEFLATED: u16 = 8;
 /// The first day that there is, 1980-01-01.
 const DATE: u16 = 0x21;
@@ -27,7 +30,8 @@ const ELSEWHERE: u64 = u32::MAX as u64;
 /// A member that is complete, or the one under way.
 #[derive(Debug)]
 struct Member {
-    name: &'static str,
+    name: String,
+    method: u16,
     /// Whether its sizes have eight bytes.
     is_large: bool,
     offset: u64,
@@ -41,7 +45,7 @@ impl Member {
     fn header(&self) -> Vec<u8> {
         let version = if self.is_large { VERSION64 } else { VERSION };
         let mut header = Vec::new();
-        for number in [version, 0, DEFLATED, 0, DATE] {
+        for number in [version, 0, self.method, 0, DATE] {
             header.extend(number.to_le_bytes());
         }
         header.extend(self.checksum.to_le_bytes());
@@ -117,10 +121,16 @@ impl ZipFile {
         }
     }
 
+    pub(super) fn path(&self) -> &Path {
+        self.output.path()
+    }
+
     /// Starts a member; `is_large` where it or what it is packed to may exceed four bytes' numbers.
-    pub(super) fn start(&mut self, name: &'static str, is_large: bool) -> Result<(), IoError> {
+    pub(super) fn start(&mut self, name: &str, is_large: bool) -> Result<(), IoError> {
         let offset = self.output.bytes();
-        let member = Member { name, is_large, offset, checksum: 0, packed_bytes: 0, bytes: 0 };
+        let (name, method) = (name.to_owned(), DEFLATED);
+        let member =
+            Member { name, method, is_large, offset, checksum: 0, packed_bytes: 0, bytes: 0 };
         self.output.write(&member.local())?;
         self.members.push(member);
         self.crc.reset();
@@ -149,6 +159,46 @@ impl ZipFile {
             return Err(IoError::TooLarge { path, what, limit: ELSEWHERE });
         }
         self.output.patch(&member.local(), member.offset)
+    }
+
+    /// Adds a member as it is. `show` is called twice and shows the same bytes: its header, which
+    /// may lie anywhere, is known before it is written.
+    pub(super) fn store(
+        &mut self,
+        name: &str,
+        mut show: impl FnMut(&mut dyn FnMut(&[u8]) -> Result<(), IoError>) -> Result<(), IoError>,
+    ) -> Result<(), IoError> {
+        let (mut crc, mut bytes) = (Crc::new(), 0);
+        show(&mut |block| {
+            crc.update(block);
+            bytes += block.len() as u64;
+            Ok(())
+        })?;
+        if bytes >= ELSEWHERE {
+            let (path, what) = (self.output.path().to_path_buf(), "bytes in one image");
+            return Err(IoError::TooLarge { path, what, limit: ELSEWHERE });
+        }
+        let member = Member {
+            name: name.to_owned(),
+            method: STORED,
+            is_large: false,
+            offset: self.output.bytes(),
+            checksum: crc.sum(),
+            packed_bytes: bytes,
+            bytes,
+        };
+        self.output.write(&member.local())?;
+        let mut again = Crc::new();
+        show(&mut |block| {
+            again.update(block);
+            self.output.write(block)
+        })?;
+        if again.sum() != member.checksum {
+            let (expected, found) = ("images that stay as they are", "another content");
+            return Err(IoError::unreadable(name.as_ref(), Place::Byte(0), expected, found));
+        }
+        self.members.push(member);
+        Ok(())
     }
 
     fn deflate(&mut self, flush: FlushCompress) -> Result<(), IoError> {

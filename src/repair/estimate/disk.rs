@@ -8,12 +8,13 @@ use serde::{Deserialize, Serialize};
 
 use crate::ingest::SoupSums;
 use crate::io::Format;
+use crate::mesh::Attributes;
 use crate::repair::estimate::counts::Counts;
 use crate::repair::plan::MemoryPlan;
 
 /// Records of spools.
 const SOUP_BYTES: f64 = 88.0;
-const ATTRIBUTE_BYTES: f64 = 40.0;
+const ATTRIBUTE_BYTES: f64 = 112.0;
 const BIN_ENTRY_BYTES: f64 = 24.0;
 /// A copy that is dropped, at most three of four triangles.
 const DROP_BYTES: f64 = 16.0 * 0.75;
@@ -88,6 +89,24 @@ const UNNUMBERED_TAPE_BYTES: f64 = 200.0;
 pub const CELL_TRIANGLE_BYTES: f64 = 60.0;
 /// A vertex under way takes so much of the proof's memory, growth included.
 pub const FAN_BYTES: f64 = 250.0;
+/// The look of a triangle, and the sort that finds it: three sides, with room for their order.
+const LOOK_BYTES: f64 = 8.0;
+const SIDE_BYTES: f64 = 3.0 * 88.0;
+/// The origin of an added triangle, the source of a crossing.
+const ORIGIN_BYTES: f64 = 4.0;
+const SOURCE_BYTES: f64 = 4.0;
+/// What a surface that gets attributes lies in before it is written: a vertex, a triangle with its
+/// corners, a place where sources are asked; of these at most three for a triangle.
+const DRAWN_VERTEX_BYTES: f64 = 24.0;
+const DRAWN_TRIANGLE_BYTES: f64 = 16.0;
+const DRAWN_CORNERS_BYTES: f64 = 3.0 * 44.0;
+const DRAWN_PLACES_BYTES: f64 = 3.0 * 40.0;
+/// What sources answer, and what corners get.
+const VALUES_BYTES: f64 = 3.0 * 32.0;
+const ANSWERS_BYTES: f64 = 3.0 * 40.0;
+/// Copies of a vertex, or of a corner's attributes at a vertex, at most: three faces meet at the
+/// corners of a cube, two at its edges.
+const COPIES: f64 = 2.0;
 /// Lock, manifest, headers, and what file systems round up.
 const SMALL_FILES_BYTES: f64 = (128_u32 << 10) as f64;
 
@@ -119,6 +138,8 @@ pub struct DiskSteps {
     pub place: u64,
     /// Surfaces in one cell are kept apart.
     pub separate: u64,
+    /// The surface is drawn, where it gets attributes.
+    pub draw: u64,
     /// The surface is written.
     pub write: u64,
     /// The written file is proved.
@@ -130,9 +151,9 @@ impl DiskSteps {
     #[must_use]
     pub fn peak(&self) -> u64 {
         let Self { read, bin, settle, mend, scan, patch, flood, revise, .. } = *self;
-        let Self { relabel, choose, place, separate, write, prove, .. } = *self;
+        let Self { relabel, choose, place, separate, draw, write, prove, .. } = *self;
         let before = [read, bin, settle, mend, scan, patch, flood, revise];
-        let all = before.into_iter().chain([relabel, choose, place, separate, write, prove]);
+        let all = before.into_iter().chain([relabel, choose, place, separate, draw, write, prove]);
         all.max().unwrap_or(0)
     }
 }
@@ -147,6 +168,8 @@ pub struct DiskModel<'e> {
     pub format: Format,
     /// Whether triangles of the output have materials.
     pub has_surfaces: bool,
+    /// What they have besides.
+    pub attributes: Attributes,
     /// What the reader of the input spilled.
     pub reader_bytes: u64,
 }
@@ -169,12 +192,14 @@ impl DiskModel<'_> {
         let most = &self.counts.at_most;
         let triangles = self.sums.finite_triangles() as f64;
         let share = self.plan.share_bytes as f64;
-        let attributes = if self.sums.has_attributes {
-            ATTRIBUTE_BYTES * self.sums.stats.triangles as f64
-        } else {
-            0.0
-        };
-        let kept = attributes + SMALL_FILES_BYTES;
+        let attributes = self.if_mapped(ATTRIBUTE_BYTES * self.sums.stats.triangles as f64);
+        let looks = self.if_mapped(LOOK_BYTES * triangles);
+        let sides = self.if_mapped(
+            spilled(SIDE_BYTES * triangles, 1.0, share / 2.0) + 3.0 * LABEL_BYTES * triangles,
+        );
+        let origins = self.if_mapped(ORIGIN_BYTES * most.added_triangles as f64);
+        let kept = attributes + looks + origins + SMALL_FILES_BYTES;
+        let (drawn, drawing, painting) = self.painted(share);
         let soup = SOUP_BYTES * triangles;
         let pairs = most.brick_triangles as f64;
         let bins = SOUP_BYTES * pairs + BIN_ENTRY_BYTES * self.counts.bricks as f64;
@@ -188,7 +213,7 @@ impl DiskModel<'_> {
         let regions = REGION_BYTES_PER_FACE * odd;
         let FileSizes { hits, signs, cells, surface, output, aside } = *files;
         DiskSteps {
-            read: (kept + soup + self.reader_bytes as f64) as u64,
+            read: (kept + soup + sides + self.reader_bytes as f64) as u64,
             bin: (kept + soup + bins + runs) as u64,
             settle: (kept
                 + soup
@@ -212,8 +237,9 @@ impl DiskModel<'_> {
             place: (kept + hits + flips + signs + cells) as u64,
             // Two looks, or the last one and the surface.
             separate: (kept + signs + cells + 2.0 * surface) as u64,
-            write: (kept + signs + cells + surface + output + aside) as u64,
-            prove: (kept + cells + surface + output + self.proof()) as u64,
+            draw: (kept + signs + cells + surface + drawn + drawing) as u64,
+            write: (kept + signs + cells + surface + drawn + painting + output + aside) as u64,
+            prove: (kept + cells + surface + drawn + output + self.proof()) as u64,
         }
     }
 
@@ -230,8 +256,11 @@ impl DiskModel<'_> {
         let (surface, face_surface) =
             if self.has_surfaces { (SURFACE_BYTES, FACE_SURFACE_BYTES) } else { (0.0, 0.0) };
         let cells = (VERTEX_BYTES + CELL_BYTES) * vertices
-            + (OFFSET_BYTES + surface) * most.crossings as f64;
+            + (OFFSET_BYTES + surface + self.if_mapped(SURFACE_BYTES + SOURCE_BYTES))
+                * most.crossings as f64;
         let face = face_bytes(self.format, vertices) + face_surface;
+        let [vertex_more, face_more] = self.more_bytes(vertices);
+        let (face, more) = (face + face_more, vertex_more * vertices);
         let (output, aside) = match self.format {
             Format::Ply => (24.0 * vertices + face * triangles, face * triangles),
             Format::Off => (LINE_BYTES * vertices + face * triangles, face * triangles),
@@ -248,13 +277,57 @@ impl DiskModel<'_> {
             signs: self.brick_file(signs),
             cells: self.brick_file(cells),
             surface: self.brick_file(cells),
-            output: output + 512.0,
-            aside,
+            output: output + more + 512.0,
+            aside: aside + more,
         }
     }
 }
 
 impl DiskModel<'_> {
+    /// So many bytes where triangles have texture coordinates or colours.
+    fn if_mapped(&self, bytes: f64) -> f64 {
+        if self.attributes.uvs || self.attributes.colours { bytes } else { 0.0 }
+    }
+
+    /// What a surface that gets attributes takes before it is written; besides, what is sorted while
+    /// it is drawn, and while it is written.
+    fn painted(&self, share: f64) -> (f64, f64, f64) {
+        if !self.attributes.any() {
+            return (0.0, 0.0, 0.0);
+        }
+        let most = &self.counts.at_most;
+        let (vertices, triangles) = (most.vertices as f64, most.triangles as f64);
+        let corners = DRAWN_CORNERS_BYTES * triangles;
+        let places = self.if_mapped(DRAWN_PLACES_BYTES * triangles);
+        let drawn = DRAWN_VERTEX_BYTES * vertices + DRAWN_TRIANGLE_BYTES * triangles;
+        let sorts = spilled(corners, 0.0, share / 4.0) + spilled(places, 0.0, share / 4.0);
+        let values = self.if_mapped(spilled(VALUES_BYTES * triangles, 0.0, share / 3.0));
+        let answers = spilled(ANSWERS_BYTES * triangles, 0.0, share / 3.0);
+        (drawn + corners + places, sorts, values + answers)
+    }
+
+    /// What the attributes of a vertex and of a triangle take in the output, or beside it.
+    fn more_bytes(&self, vertices: f64) -> [f64; 2] {
+        let Attributes { uvs, colours, normals } = self.attributes;
+        let of = |has: bool, bytes: f64| if has { bytes } else { 0.0 };
+        let digits = vertices.max(1.0).log10().floor() + 2.0;
+        match self.format {
+            Format::Obj => [
+                of(colours, 24.0) + COPIES * (of(uvs, 32.0) + of(normals, 44.0)),
+                3.0 * (of(uvs, digits) + of(normals, digits + 1.0)),
+            ],
+            Format::Ply => [of(colours, 4.0), of(uvs, 29.0)],
+            Format::Glb if self.attributes.any() => {
+                let each = 12.0 + of(uvs, 8.0) + of(colours, 4.0) + of(normals, 12.0);
+                [COPIES * each, 0.0]
+            }
+            Format::ThreeMf => {
+                [of(colours, 40.0), of(uvs, 3.0 * 64.0 + 24.0 + 3.0 * 16.0) + of(colours, 40.0)]
+            }
+            Format::Glb | Format::Off | Format::Stl => [0.0, 0.0],
+        }
+    }
+
     /// Cells in the box of the model, as far as they can be hit.
     fn boxed_cells(&self) -> f64 {
         self.counts.boxed_cells as f64

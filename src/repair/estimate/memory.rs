@@ -5,6 +5,7 @@
 
 use crate::ingest::SoupSums;
 use crate::io::Format;
+use crate::mesh::Attributes;
 use crate::repair::estimate::counts::Counts;
 use crate::repair::estimate::disk::{CELL_TRIANGLE_BYTES, FAN_BYTES, FileSizes, SMALL_BIN};
 use crate::repair::plan::{MemoryPlan, WINDOW_BYTES};
@@ -25,6 +26,10 @@ const SORTED_BYTES: f64 = 320.0;
 /// A flipped edge in the cuts of its opening, and an odd face.
 const FLIP_BYTES: f64 = 100.0;
 const FACE_BYTES: f64 = 100.0;
+/// A triangle whose seams are looked for: three sides, with their places in the order.
+const SIDE_BYTES: f64 = 3.0 * 176.0;
+/// A triangle that is painted: its corners in two sorts.
+const CORNERS_BYTES: f64 = 6.0 * 40.0;
 /// A vertex of the output: its hash, and its position in the table of the reader.
 const HASH_BYTES: f64 = 8.0;
 const POSITION_BYTES: f64 = 24.0;
@@ -42,6 +47,8 @@ pub struct MemoryModel<'e> {
     pub counts: &'e Counts,
     pub plan: &'e MemoryPlan,
     pub format: Format,
+    /// What the output has besides its shape.
+    pub attributes: Attributes,
     /// Triangles in the largest bin.
     pub largest_bin: f64,
     pub input_format: Format,
@@ -58,7 +65,13 @@ impl MemoryModel<'_> {
         let windows = self.plan.cached_windows as f64 * WINDOW_BYTES as f64;
         let window = |file: f64| file.min(windows);
         let threads = self.plan.threads as f64;
-        let read = self.reader();
+        let is_mapped = self.attributes.uvs || self.attributes.colours;
+        let looks = if is_mapped {
+            (SIDE_BYTES * self.sums.finite_triangles() as f64).min(share / 2.0)
+        } else {
+            0.0
+        };
+        let read = self.reader().max(looks);
         let bin = (BIN_SORT_BYTES * pairs).min(share);
         let examine = if self.largest_bin > SMALL_BIN {
             (SORTED_BYTES * pairs.min(threads * self.largest_bin)).min(share / 2.0)
@@ -70,7 +83,12 @@ impl MemoryModel<'_> {
         let flood = window(files.hits) + (FACE_BYTES * most.odd_faces as f64).min(share);
         let contour = window(files.signs) + window(files.cells);
         let early = read.max(bin).max(examine);
-        let late = patch.max(flood).max(contour).max(self.proof(files));
+        let painting = if self.attributes.any() {
+            (CORNERS_BYTES * most.triangles as f64).min(share / 1.5)
+        } else {
+            0.0
+        };
+        let late = patch.max(flood).max(contour + painting).max(self.proof(files));
         let bytes =
             BASE_BYTES + THREAD_BYTES * threads + early.max(early.min(RETAINED_BYTES) + late);
         (bytes as u64).min(budget_bytes)

@@ -128,6 +128,7 @@ pub fn estimate(
     let no_unit = || RepairError::NoUnit { path: input.to_path_buf() };
     let counts = Counts::predict(&sums, &grid, sheet_cells.ok_or_else(no_unit)?);
     let reader_bytes = scratch.written_bytes();
+    let attributes = settings.gets(format, sums.attributes);
     let disk_model = DiskModel {
         sums: &sums,
         counts: &counts,
@@ -135,6 +136,7 @@ pub fn estimate(
         plan: &plan,
         format,
         has_surfaces: format.has_materials() && (sums.has_materials || settings.tag_patches),
+        attributes,
         reader_bytes,
     };
     let files = disk_model.files();
@@ -147,6 +149,7 @@ pub fn estimate(
         counts: &counts,
         plan: &plan,
         format,
+        attributes,
         largest_bin: disk_model.largest_bin(),
         input_format,
         input_vertices,

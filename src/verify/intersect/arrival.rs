@@ -2,10 +2,10 @@
 //!
 //! Invariant:  what is taken from a parcel is what was put into it.
 
+use crate::geom::signs::Point;
 use crate::store::StoreError;
 use crate::verify::intersect::grid::box_of;
 use crate::verify::intersect::parcels::{MOST_VERTICES, POSITION_WORDS, TRIANGLE_WORDS};
-use crate::verify::intersect::signs::Point;
 
 /// A triangle on its way into cells.
 #[derive(Clone, Copy)]

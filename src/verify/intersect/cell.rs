@@ -4,6 +4,7 @@
 //! Out:        how many pairs of triangles intersect, and the first of them.
 //! Memory:     about 230 bytes a triangle, 500 at most.
 
+use crate::geom::signs::{Point, is_tame};
 use crate::store::StoreError;
 use crate::verify::intersect::arrival::Unpacked;
 use crate::verify::intersect::boxes::NearBox;
@@ -15,7 +16,6 @@ use crate::verify::intersect::judge::{Found, Judge, WidePairs};
 use crate::verify::intersect::near::NearPairs;
 use crate::verify::intersect::pair::{Face, Sharing};
 use crate::verify::intersect::parcels::Parcel;
-use crate::verify::intersect::signs::{Point, is_tame};
 use crate::verify::positions::{PositionKey, key_of};
 use crate::verify::slots::{Name, Slots};
 

@@ -4,11 +4,10 @@
 //! Out:        tasks, which together show each pair of its triangles once.
 //! Memory:     that of a task.
 
-use crate::store::StoreError;
+use crate::store::{Sequence, StoreError};
 use crate::verify::intersect::cell::{Cell, CellTask};
 use crate::verify::intersect::join::Group;
 use crate::verify::intersect::parcels::{Packed, Parcel};
-use crate::verify::spool::Spool;
 
 /// A cell that does not fit in memory and that no division makes smaller.
 pub(crate) struct Crowd {
@@ -80,7 +79,7 @@ pub(crate) fn task_of(packed: &Packed, cells: Vec<Cell>) -> CellTask {
 pub(crate) fn append(
     task: &mut CellTask,
     packed: &Packed,
-    parcels: &Spool<Parcel>,
+    parcels: &Sequence<Parcel>,
     range: std::ops::Range<u64>,
 ) -> Result<(), StoreError> {
     let mut buffer = Vec::new();

@@ -7,7 +7,7 @@
 //! where one of the two triangles ends: on an edge opposite to the vertex. Without a shared vertex
 //! an edge of one meets the other.
 
-use crate::verify::intersect::signs::{Point, Signs};
+use crate::geom::signs::{Point, Signs};
 
 /// Whether they meet; the first `shared` corners are the same in both.
 #[cold]

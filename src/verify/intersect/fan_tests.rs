@@ -2,11 +2,11 @@
 
 use std::f64::consts::TAU;
 
+use crate::geom::signs::{Point, is_tame};
 use crate::mesh::shapes::Random;
 use crate::verify::intersect::filters::Normal;
 use crate::verify::intersect::flat_fans::FlatFans;
 use crate::verify::intersect::pair::Face;
-use crate::verify::intersect::signs::{Point, is_tame};
 use crate::verify::intersect::tests::{Mesh, check, proof};
 
 /// Triangles from an apex at the origin, vertex 0, to a round of points; open it lacks the last.

@@ -1,10 +1,10 @@
 //! Signs that are beyond all doubt of rounding, in plain f64.
 //!
-//! In:         tame points, see [`Signs`](crate::verify::intersect::Signs), and differences of them.
+//! In:         tame points, see [`Signs`](crate::geom::signs::Signs), and differences of them.
 //! Invariant:  a sign that is not 0 is the exact one.
 //! Source:     Shewchuk 1997 for the bounds.
 
-use crate::verify::intersect::signs::{PLANES, Point};
+use crate::geom::signs::{PLANES, Point};
 
 /// Error of a 2 x 2 determinant of differences, per magnitude of its products.
 const TURN_BOUND: f64 = 3.4e-16;

@@ -13,9 +13,9 @@
 //! a ray that none of them passes leaves less than a round. What lies side by side in sight does so
 //! in space.
 
+use crate::geom::signs::Point;
 use crate::verify::intersect::filters::{Normal, SureProduct, minus};
 use crate::verify::intersect::pair::Face;
-use crate::verify::intersect::signs::Point;
 
 /// Directions are whole numbers of at most so many bits, and so are products of two.
 const DIRECTION: f64 = (1 << 20) as f64;

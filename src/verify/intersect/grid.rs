@@ -4,7 +4,7 @@
 //!             the join of cells rests on: rounding moves walls, alike for all triangles.
 //! Units:      model units; a cell's side is a power of two.
 
-use crate::verify::intersect::signs::Point;
+use crate::geom::signs::Point;
 
 /// Cells of the outermost grid along an axis, as a power of two. What lies farther out belongs to
 /// the last ones.

@@ -12,14 +12,13 @@ use std::sync::{Mutex, PoisonError};
 use rayon::ThreadPool;
 
 use crate::monitor::Monitor;
-use crate::store::{Scratch, Sorter, StoreError, ordered};
+use crate::store::{Scratch, Sequence, Sorter, StoreError, ordered};
 use crate::verify::intersect::cell::{Cell, CellTask, Workbench};
 use crate::verify::intersect::crowd::{Crowd, append, task_of};
 use crate::verify::intersect::grid::{Grid, cell_of_key, extent_of};
 use crate::verify::intersect::judge::{Found, WidePairs};
 use crate::verify::intersect::parcels::{Packed, Packer, Parcel};
 use crate::verify::intersect::reach::Reach;
-use crate::verify::spool::Spool;
 use crate::verify::tape::stop_if_asked;
 
 /// What a triangle takes at most in a worker, and in the tasks that wait for it.
@@ -102,8 +101,7 @@ impl Join<'_> {
         let mut last = None;
         while let Some(next) = pairs.next()? {
             if last != Some(next.pair) {
-                found.pairs += 1;
-                found.places.offer(next.pair, next.place);
+                found.count(next.pair, next.place, next.meeting);
                 last = Some(next.pair);
             }
         }
@@ -128,7 +126,7 @@ struct Level {
 pub(crate) struct Group {
     /// The cell, and behind it those that it lies in.
     pub(crate) cells: Vec<Cell>,
-    pub(crate) parcels: Spool<Parcel>,
+    pub(crate) parcels: Sequence<Parcel>,
     triangles: u64,
     extents: f64,
 }
@@ -145,7 +143,7 @@ impl Level {
         let key = first.key >> (3 * self.shift);
         let cell = Cell { grid: self.grid, shift: self.shift, at: cell_of_key(key) };
         let cells = std::iter::once(cell).chain(self.around.iter().copied()).collect();
-        let parcels = Spool::new(scratch, share);
+        let parcels = Sequence::new(scratch, share);
         let mut group = Group { cells, parcels, triangles: 0, extents: 0.0 };
         while let Some(parcel) = self.next.filter(|next| next.key >> (3 * self.shift) == key) {
             group.parcels.push(parcel)?;

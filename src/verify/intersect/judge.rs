@@ -9,11 +9,11 @@ use std::sync::{Mutex, PoisonError};
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::defect::{Meeting, MeetingCounts, Smallest};
+use crate::geom::signs::Point;
 use crate::store::{Record, Sorter, StoreError};
 use crate::verify::intersect::grid::box_of;
-use crate::verify::intersect::pair::{Face, Sharing, intersect};
-use crate::verify::intersect::signs::Point;
-use crate::verify::places::Smallest;
+use crate::verify::intersect::pair::{Face, Sharing, intersect, meeting_of};
 
 /// A pair of triangles, by the smaller number first.
 pub(crate) type Pair = [u64; 2];
@@ -24,6 +24,8 @@ pub(crate) type Pair = [u64; 2];
 pub(crate) struct WidePair {
     pub(crate) pair: Pair,
     pub(crate) place: Point,
+    /// Its number among [`Meeting::ALL`].
+    pub(crate) meeting: u64,
 }
 
 impl Record for WidePair {
@@ -40,22 +42,33 @@ pub(crate) type WidePairs = Mutex<Sorter<WidePair>>;
 const MOST_KEPT: usize = 256;
 /// What was found.
 pub(crate) struct Found {
-    pub(crate) pairs: u64,
-    /// The first pairs, and where the overlaps of their boxes have their middles.
-    pub(crate) places: Smallest<Pair, Point>,
+    pub(crate) pairs: MeetingCounts,
+    /// The first pairs of each way to meet, and where the overlaps of their boxes have their
+    /// middles.
+    pub(crate) places: [Smallest<Pair, Point>; 4],
     /// Triangles that begin in the cell.
     pub(crate) triangles: u64,
 }
 
 impl Found {
     pub(crate) fn new() -> Self {
-        Self { pairs: 0, places: Smallest::new(), triangles: 0 }
+        let places = std::array::from_fn(|_| Smallest::new());
+        Self { pairs: MeetingCounts::default(), places, triangles: 0 }
     }
 
     pub(crate) fn add(&mut self, other: &Self) {
-        self.pairs += other.pairs;
+        self.pairs.add(&other.pairs);
         self.triangles += other.triangles;
-        other.places.iter().for_each(|&(pair, place)| self.places.offer(pair, place));
+        for (own, others) in self.places.iter_mut().zip(&other.places) {
+            others.iter().for_each(|&(pair, place)| own.offer(pair, place));
+        }
+    }
+
+    /// Counts a pair; the number is its way to meet, among [`Meeting::ALL`].
+    pub(crate) fn count(&mut self, pair: Pair, place: Point, meeting: u64) {
+        let meeting = meeting as usize;
+        *self.pairs.of_mut(Meeting::ALL[meeting]) += 1;
+        self.places[meeting].offer(pair, place);
     }
 }
 
@@ -78,25 +91,25 @@ impl Judge<'_> {
         for (a, b, sharing) in queue.drain(..) {
             let [a, b] = [a as usize, b as usize];
             if intersect(sharing, &self.faces[a], &self.faces[b], self.positions) {
-                self.enter(a, b);
+                self.enter(a, b, sharing);
             }
         }
     }
 
     #[cold]
-    fn enter(&mut self, a: usize, b: usize) {
+    fn enter(&mut self, a: usize, b: usize, sharing: Sharing) {
         let corner = |vertex: u32| self.positions[vertex as usize];
         let place = middle_of_overlap([a, b].map(|at| self.faces[at].vertices.map(corner)));
+        let meeting = meeting_of(sharing, &self.faces[a], &self.faces[b], self.positions) as u64;
         let numbers = [self.numbers[a], self.numbers[b]];
         let pair = [numbers[0].min(numbers[1]), numbers[0].max(numbers[1])];
         if self.is_wide[a] || self.is_wide[b] {
-            self.kept.push(WidePair { pair, place });
+            self.kept.push(WidePair { pair, place, meeting });
             if self.kept.len() == MOST_KEPT {
                 self.hand_on();
             }
         } else {
-            self.found.pairs += 1;
-            self.found.places.offer(pair, place);
+            self.found.count(pair, place, meeting);
         }
     }
 

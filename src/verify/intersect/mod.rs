@@ -26,22 +26,23 @@ mod flat_fans;
 mod grid;
 mod join;
 mod judge;
+mod meeting;
+#[cfg(test)]
+mod meeting_tests;
 mod near;
 mod pair;
 #[cfg(test)]
 mod pair_tests;
 mod parcels;
 mod reach;
-mod signs;
 #[cfg(test)]
 mod tests;
-mod wide;
 
 pub(crate) use judge::Found;
-pub(crate) use signs::{Signs, is_tame};
 
 use rayon::ThreadPool;
 
+use crate::geom::signs::Point;
 use crate::monitor::Monitor;
 use crate::store::{Scratch, StoreError};
 use crate::verify::intersect::arrival::Arrival;
@@ -49,7 +50,6 @@ use crate::verify::intersect::grid::{Grid, box_of, extent_of};
 use crate::verify::intersect::join::{Join, Shares};
 use crate::verify::intersect::parcels::Packer;
 use crate::verify::intersect::reach::Reach;
-use crate::verify::intersect::signs::Point;
 
 /// The first triangles, whose size decides on the grid.
 const EARLY: usize = 256;

@@ -5,9 +5,11 @@
 //! Invariant:  exact. A filter only ever says that they do not meet: it names a plane or a line
 //!             through what they share that separates them beyond all doubt of rounding.
 
+use crate::defect::Meeting;
+use crate::geom::signs::{Point, Signs};
 use crate::verify::intersect::exact_pair::meet;
 use crate::verify::intersect::filters::{Normal, along, minus, side, turn};
-use crate::verify::intersect::signs::{Point, Signs};
+use crate::verify::intersect::meeting::meeting;
 
 /// A triangle as the tests see it.
 #[derive(Clone, Copy)]
@@ -110,6 +112,18 @@ pub(crate) fn intersect(sharing: Sharing, a: &Face, b: &Face, positions: &[Point
         }
     }
     meet(signs, p, q, shared)
+}
+
+/// How two triangles that intersect meet.
+#[cold]
+pub(crate) fn meeting_of(sharing: Sharing, a: &Face, b: &Face, positions: &[Point]) -> Meeting {
+    let Match { first, second, shared } = MATCHES[usize::from(sharing.0)];
+    if shared == 3 {
+        return Meeting::Duplicate;
+    }
+    let p = first.map(|i| positions[a.vertices[usize::from(i)] as usize]);
+    let q = second.map(|j| positions[b.vertices[usize::from(j)] as usize]);
+    meeting(Signs { tame: a.tame && b.tame }, p, q)
 }
 
 /// With a common edge: seen from somewhere they lie on both sides of it, or they fold there.

@@ -2,9 +2,9 @@
 
 use proptest::prelude::*;
 
+use crate::geom::signs::{Point, is_tame};
 use crate::verify::intersect::filters::Normal;
 use crate::verify::intersect::pair::{Face, Sharing, intersect};
-use crate::verify::intersect::signs::{Point, is_tame};
 
 /// A point over a common denominator, which is positive and comes last.
 type Ratio = [i128; 4];

@@ -11,13 +11,12 @@ use std::collections::HashMap;
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::store::{Record, Scratch, Sorted, Sorter, StoreError};
+use crate::geom::signs::Point;
+use crate::store::{Record, Scratch, Sequence, Sorted, Sorter, StoreError};
 use crate::verify::intersect::arrival::{Arrival, Unpacked};
 use crate::verify::intersect::grid::{extent_of, key_of_cell};
-use crate::verify::intersect::signs::Point;
 use crate::verify::positions::{hash, key_of};
 use crate::verify::slots::mix;
-use crate::verify::spool::Spool;
 
 /// Vertices of a parcel: three of their places fit in 32 bits.
 pub(crate) const MOST_VERTICES: usize = 1024;
@@ -124,7 +123,7 @@ impl Open {
 
 /// Fills parcels.
 pub(crate) struct Packer {
-    words: Spool<u32>,
+    words: Sequence<u32>,
     parcels: Sorter<Parcel>,
     open: Vec<Open>,
     of_cell: HashMap<u64, usize>,
@@ -138,7 +137,7 @@ pub(crate) struct Packer {
 
 /// Filled parcels.
 pub(crate) struct Packed {
-    words: Spool<u32>,
+    words: Sequence<u32>,
     parcels: Sorted<Parcel>,
     pub(crate) named: bool,
 }
@@ -147,7 +146,7 @@ impl Packer {
     /// Parcels of at most so many triangles.
     pub(crate) fn new(scratch: &Scratch, share_bytes: u64, most_triangles: usize) -> Self {
         Self {
-            words: Spool::new(scratch, share_bytes / 2),
+            words: Sequence::new(scratch, share_bytes / 2),
             parcels: Sorter::new(scratch, share_bytes / 8),
             open: Vec::new(),
             of_cell: HashMap::new(),

@@ -3,8 +3,8 @@
 //! In:         a triangle and a box of cells.
 //! Invariant:  no cell that it meets is left out; some that it does not meet may be there.
 
+use crate::geom::signs::{PLANES, Point};
 use crate::verify::intersect::grid::{CellRange, Grid, box_of, extent_of};
-use crate::verify::intersect::signs::{PLANES, Point};
 
 /// Far above what rounding adds up to in these sums.
 const SLACK: f64 = 1.0e-9;

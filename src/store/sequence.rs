@@ -10,7 +10,7 @@ use crate::store::{Scratch, ScratchFile, StoreError};
 const BLOCK_BYTES: usize = 64 << 10;
 
 /// Records in the order in which they came.
-pub(crate) struct Spool<R: Pod> {
+pub struct Sequence<R: Pod> {
     scratch: Scratch,
     share_bytes: usize,
     resident: Vec<R>,
@@ -18,22 +18,33 @@ pub(crate) struct Spool<R: Pod> {
     written: u64,
 }
 
-impl<R: Pod> Spool<R> {
+impl<R: Pod> Sequence<R> {
     /// An empty spool that keeps at most `share_bytes` in memory.
-    pub(crate) fn new(scratch: &Scratch, share_bytes: u64) -> Self {
+    #[must_use]
+    pub fn new(scratch: &Scratch, share_bytes: u64) -> Self {
         let share_bytes = usize::try_from(share_bytes).unwrap_or(usize::MAX).max(size_of::<R>());
         let scratch = scratch.clone();
         Self { scratch, share_bytes, resident: Vec::new(), file: None, written: 0 }
     }
 
     /// The number of records.
-    pub(crate) fn len(&self) -> u64 {
+    #[must_use]
+    pub fn len(&self) -> u64 {
         self.written + self.resident.len() as u64
     }
 
+    /// Whether there is no record.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
     /// Appends a record.
+    ///
+    /// # Errors
+    /// The scratch disk fails.
     #[inline]
-    pub(crate) fn push(&mut self, record: R) -> Result<(), StoreError> {
+    pub fn push(&mut self, record: R) -> Result<(), StoreError> {
         if self.resident.len() == self.resident.capacity() {
             self.make_room()?;
         }
@@ -42,7 +53,10 @@ impl<R: Pod> Spool<R> {
     }
 
     /// Appends records.
-    pub(crate) fn extend(&mut self, records: &[R]) -> Result<(), StoreError> {
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn extend(&mut self, records: &[R]) -> Result<(), StoreError> {
         let mut left = records;
         while !left.is_empty() {
             if self.resident.len() == self.resident.capacity() {
@@ -90,7 +104,7 @@ impl<R: Pod> Spool<R> {
     }
 
     /// Forgets all records.
-    pub(crate) fn clear(&mut self) {
+    pub fn clear(&mut self) {
         self.resident.clear();
         self.written = 0;
     }
@@ -98,7 +112,10 @@ impl<R: Pod> Spool<R> {
     /// At most `count` records from number `start` on; `buffer` is room for those on disk.
     ///
     /// Fewer come where the part on disk ends, none only at the end.
-    pub(crate) fn block<'a>(
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn block<'a>(
         &'a self,
         start: u64,
         count: usize,
@@ -116,6 +133,27 @@ impl<R: Pod> Spool<R> {
     }
 }
 
+impl<R: Pod> Sequence<R> {
+    /// Shows all records in order, in blocks of at most `count`.
+    ///
+    /// # Errors
+    /// The scratch disk fails, or `visit` does.
+    pub fn each_block(
+        &self,
+        count: usize,
+        mut visit: impl FnMut(&[R]) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        let mut start = 0;
+        let mut buffer = Vec::new();
+        while start < self.len() {
+            let block = self.block(start, count, &mut buffer)?;
+            start += block.len() as u64;
+            visit(block)?;
+        }
+        Ok(())
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -125,7 +163,7 @@ mod tests {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let scratch = Scratch::new(folder.path());
         for share_bytes in [0, 100, 4096, 1 << 20] {
-            let mut spool = Spool::<u64>::new(&scratch, share_bytes);
+            let mut spool = Sequence::<u64>::new(&scratch, share_bytes);
             (0..5000).for_each(|i| spool.push(i).expect("push works"));
             assert_eq!(spool.file.is_some(), share_bytes <= 4096);
             let (mut seen, mut buffer) = (Vec::new(), Vec::new());

@@ -7,10 +7,10 @@
 
 use robust::{Coord, Coord3D, orient2d, orient3d};
 
-use crate::verify::intersect::wide::{wide_orient2d, wide_orient3d};
+use crate::geom::wide::{wide_orient2d, wide_orient3d};
 
-/// A position.
-pub(crate) type Point = [f64; 3];
+/// A position, model units.
+pub type Point = [f64; 3];
 
 const TAME: std::ops::RangeInclusive<f64> = {
     let most = f64::from_bits((1023 + 200) << 52);
@@ -19,18 +19,20 @@ const TAME: std::ops::RangeInclusive<f64> = {
 
 /// Whether adaptive f64 arithmetic is exact on a point.
 #[inline]
-pub(crate) fn is_tame(p: &Point) -> bool {
+#[must_use]
+pub fn is_tame(p: &Point) -> bool {
     p.iter().all(|x| *x == 0.0 || TAME.contains(&x.abs()))
 }
 
 /// Signs over points that are all tame, or not.
 #[derive(Clone, Copy)]
-pub(crate) struct Signs {
-    pub(crate) tame: bool,
+pub struct Signs {
+    /// Whether all points that are asked about are tame.
+    pub tame: bool,
 }
 
 /// The coordinates that stay when one axis is dropped.
-pub(crate) const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
+pub const PLANES: [[usize; 2]; 3] = [[1, 2], [2, 0], [0, 1]];
 
 fn sign_of(x: f64) -> i32 {
     i32::from(x > 0.0) - i32::from(x < 0.0)
@@ -38,7 +40,8 @@ fn sign_of(x: f64) -> i32 {
 
 impl Signs {
     /// On which side of the plane of `a`, `b` and `c` a point lies; 0 in the plane.
-    pub(crate) fn side(self, [a, b, c]: [Point; 3], p: Point) -> i32 {
+    #[must_use]
+    pub fn side(self, [a, b, c]: [Point; 3], p: Point) -> i32 {
         if self.tame {
             let at = |[x, y, z]: Point| Coord3D { x, y, z };
             sign_of(orient3d(at(a), at(b), at(c), at(p)))
@@ -48,7 +51,8 @@ impl Signs {
     }
 
     /// Which way `a`, `b`, `c` turn when `axis` is dropped; 0 on a line.
-    pub(crate) fn turn(self, axis: usize, a: Point, b: Point, c: Point) -> i32 {
+    #[must_use]
+    pub fn turn(self, axis: usize, a: Point, b: Point, c: Point) -> i32 {
         let [u, v] = PLANES[axis];
         if self.tame {
             let at = |p: Point| Coord { x: p[u], y: p[v] };
