@@ -2,6 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::File;
+use std::io::{BufRead, BufReader, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
@@ -10,6 +11,9 @@ use crate::monitor::Monitor;
 use crate::repair::{Blame, Limits, MemoryPlan, RepairError};
 use crate::store::{Scratch, StoreError, sync_folder};
 use crate::verify::{Outward, ProofOptions, VerifyError, Vertices, prove};
+
+/// Files are named at the beginning, or not at all.
+const MOST_LOOKED_AT_BYTES: u64 = 1 << 20;
 
 /// Copies `input` to `output`, whole or not at all, if it is sound and of the format that is asked
 /// for; whether it was.
@@ -27,16 +31,30 @@ pub fn copy_if_sound(
     limits: &Limits,
     monitor: &dyn Monitor,
 ) -> Result<bool, RepairError> {
-    let is_packed = crate::io::unpacked_name(input) != input;
+    let is_packed =
+        crate::io::unpacked_name(input) != input || input.extension() != output.extension();
     if is_packed || format_of_name(input) != Some(format) || format_of_name(output) != Some(format)
     {
         return Ok(false);
     }
-    if !is_sound(input, limits, monitor)? {
+    if names_others(input, format) || !is_sound(input, limits, monitor)? {
         return Ok(false);
     }
     copy(input, output, limits)?;
     Ok(true)
+}
+
+/// Whether the model names files beside it: alone, its copy would be less than it.
+fn names_others(input: &Path, format: Format) -> bool {
+    let word: &[u8] = match format {
+        Format::Obj => b"mtllib",
+        Format::Ply => b"comment TextureFile",
+        Format::Stl | Format::Off | Format::ThreeMf | Format::Glb => return false,
+    };
+    // What cannot be read is told by what comes next.
+    let Ok(file) = File::open(input) else { return false };
+    let mut lines = BufReader::new(file.take(MOST_LOOKED_AT_BYTES)).split(b'\n');
+    lines.any(|line| line.is_ok_and(|line| line.trim_ascii_start().starts_with(word)))
 }
 
 fn is_sound(input: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<bool, RepairError> {
