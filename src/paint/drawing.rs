@@ -16,10 +16,6 @@ use crate::store::{FileState, Record, Resources, Scratch, Sorter, Spool, SpoolWr
 /// the attributes of source triangles are asked for, by source number.
 pub const DRAWN: [&str; 4] = ["drawn.vertices", "drawn.triangles", "drawn.corners", "drawn.places"];
 
-/// A triangle whose height is a smaller share of its longest side has no normal: three vertices on
-/// one crease.
-const LEAST_HEIGHT: f64 = 1e-4;
-
 /// A triangle of the surface. 16 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
@@ -236,13 +232,11 @@ impl Drawing {
     }
 }
 
-/// The unit normal, zero where the triangle is too narrow to have one; and the least height.
+/// The unit normal, zero where there is none; and the least height.
 fn normal_and_height([a, b, c]: [DVec3; 3]) -> (DVec3, f64) {
     let cross = (b - a).cross(c - a);
     let longest = a.distance(b).max(b.distance(c)).max(c.distance(a));
-    let height = cross.length() / longest.max(f64::MIN_POSITIVE);
-    let is_narrow = height <= LEAST_HEIGHT * longest;
-    (if is_narrow { DVec3::ZERO } else { cross.normalize_or_zero() }, height)
+    (cross.normalize_or_zero(), cross.length() / longest.max(f64::MIN_POSITIVE))
 }
 
 fn spool_sorted<R: Record>(

@@ -15,6 +15,10 @@ const MOST_BEND_DEG: f64 = 30.0;
 /// Of facets whose height is less than so many times as much no normal tells anything.
 const NARROW: f64 = 4.0;
 
+/// Nor of those that are so much narrower than the widest at their vertex: three vertices on one
+/// crease.
+const LEAST_SHARE: f64 = 1e-3;
+
 /// Room for one vertex after another.
 pub struct Fans {
     /// Dihedral angles with a smaller cosine divide.
@@ -83,17 +87,17 @@ impl Fans {
         &self.parts
     }
 
-    /// Which triangles are wide enough that their normals count; all that have one where none is.
+    /// Which triangles are wide enough that their normals count: the widest at least.
     fn find_normals(&mut self, corners: &[DrawnCorner]) {
-        for least in [NARROW * self.slack, 0.0] {
-            self.counts.clear();
-            self.counts.extend(corners.iter().map(|corner| {
-                normal_of(corner) != DVec3::ZERO && f64::from(corner.height) > least
-            }));
-            if self.counts.contains(&true) {
-                break;
-            }
-        }
+        let heights = corners.iter().map(|corner| f64::from(corner.height));
+        let widest = heights.fold(0.0, f64::max);
+        let least = (NARROW * self.slack).clamp(LEAST_SHARE * widest, 0.5 * widest);
+        self.counts.clear();
+        self.counts.extend(
+            corners.iter().map(|corner| {
+                normal_of(corner) != DVec3::ZERO && f64::from(corner.height) >= least
+            }),
+        );
     }
 
     /// The mean of the normals of a part, weighted by their angles; that of the first where they
