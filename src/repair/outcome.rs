@@ -229,6 +229,6 @@ pub struct Outcome {
 }
 
 /// Names of files may have any bytes, and JSON has text only.
-fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
+pub(super) fn as_text<S: Serializer>(path: &Path, serializer: S) -> Result<S::Ok, S::Error> {
     serializer.serialize_str(&path.to_string_lossy())
 }

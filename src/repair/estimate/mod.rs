@@ -27,6 +27,7 @@ use crate::repair::depth::choose_domain;
 use crate::repair::estimate::disk::DiskModel;
 use crate::repair::estimate::memory::MemoryModel;
 use crate::repair::length::Ruler;
+use crate::repair::outcome::as_text;
 use crate::repair::plan::{MemoryPlan, floor_bytes};
 use crate::repair::settings::{Limits, Settings};
 use crate::store::Scratch;
@@ -45,6 +46,7 @@ pub struct Estimate {
     /// Version of the program.
     pub version: String,
     /// Path of the input.
+    #[serde(serialize_with = "as_text")]
     pub path: PathBuf,
     /// Cells with a marked edge, expected.
     pub leaf_cells: u64,
