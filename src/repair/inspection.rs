@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 use crate::diagnose::{Finding, LoopReport, Owners, ShellReport};
 use crate::mesh::LengthUnit;
 use crate::repair::length::Length;
+use crate::repair::outcome::as_text;
 
 /// Version of the schema of inspections.
 pub const INSPECTION_VERSION: u32 = 1;
@@ -52,6 +53,7 @@ pub struct Inspection {
     /// Version of the program.
     pub version: String,
     /// Path of the model as given.
+    #[serde(serialize_with = "as_text")]
     pub path: PathBuf,
     /// Whether nothing was found but remarks.
     pub is_sound: bool,
