@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use rusqlite::{Connection, Row, params};
 
 use crate::catalogue::CatalogueError;
-use crate::catalogue::journal::Journal;
+use crate::catalogue::journal::{Journal, failed};
 use crate::catalogue::names::distinct_name;
 use crate::catalogue::stamp::Stamp;
 use crate::catalogue::state::{Cause, State};
@@ -141,12 +141,12 @@ impl Journal {
         ) -> Result<T, CatalogueError>,
     ) -> Result<(Enrolled, T), CatalogueError> {
         let path = self.path.clone();
-        let failed = |error| super::failed(&path, error);
-        self.connection.execute_batch(SEEN).map_err(failed)?;
-        let transaction = self.connection.transaction().map_err(failed)?;
+        let fail = |error| failed(&path, error);
+        self.connection.execute_batch(SEEN).map_err(fail)?;
+        let transaction = self.connection.transaction().map_err(fail)?;
         let walked = {
             let insert = "INSERT OR REPLACE INTO temp.seen VALUES (?1,?2,?3,?4,?5,?6,?7,?8,?9)";
-            let mut insert = transaction.prepare(insert).map_err(failed)?;
+            let mut insert = transaction.prepare(insert).map_err(fail)?;
             walk(&mut |seen: Seen| {
                 let stamp = seen.stamp;
                 let entered = insert.execute(params![
@@ -160,11 +160,11 @@ impl Journal {
                     stamp.ctime_ns,
                     stamp.inode as i64,
                 ]);
-                entered.map(|_| ()).map_err(failed)
+                entered.map(|_| ()).map_err(fail)
             })?
         };
-        let enrolled = settle(&transaction, run, source).map_err(failed)?;
-        transaction.commit().map_err(failed)?;
+        let enrolled = settle(&transaction, run, source).map_err(fail)?;
+        transaction.commit().map_err(fail)?;
         Ok((enrolled, walked))
     }
 }

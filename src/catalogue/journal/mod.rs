@@ -123,7 +123,7 @@ impl Journal {
     }
 }
 
-fn failed(path: &Path, source: rusqlite::Error) -> CatalogueError {
+pub(crate) fn failed(path: &Path, source: rusqlite::Error) -> CatalogueError {
     CatalogueError::Journal { path: path.to_path_buf(), source }
 }
 
