@@ -6,9 +6,11 @@ use std::fmt::Write;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
-use brickmend::mesh::shapes::{cuboid, sphere};
+use brickmend::catalogue::Journal;
+use brickmend::mesh::shapes::{cuboid, sphere, torus};
+use rustix::process::{Pid, Signal, kill_process};
 use tempfile::TempDir;
 
 /// A folder of models and one of results.
@@ -216,4 +218,90 @@ fn a_batch_that_is_killed_goes_on_and_ends_as_if_it_had_not_been() {
             .count()
     });
     assert_eq!(left, 0, "nothing is left of the work");
+}
+
+#[test]
+fn what_is_not_ours_in_the_work_folder_stays() {
+    let library = Library::new();
+    let scratch = library.folder.path().join("scratch");
+    for name in ["2024", "slot-machines"] {
+        std::fs::create_dir_all(scratch.join(name)).expect("a folder");
+        std::fs::write(scratch.join(name).join("photo"), "precious").expect("writable");
+    }
+    let work = scratch.to_str().expect("a name of ours");
+    for _ in 0..2 {
+        assert_eq!(library.batch(&["--work-dir", work]).0, 3);
+        let left: Vec<PathBuf> = files_in(&scratch).into_keys().collect();
+        assert_eq!(left, [Path::new("2024/photo"), Path::new("slot-machines/photo")]);
+    }
+}
+
+/// One model that takes a while.
+fn slow_library() -> Library {
+    let library = Library { folder: tempfile::tempdir().expect("a temporary folder") };
+    library.write("slow.obj".as_ref(), &obj_of(&torus(1.0, 0.4, 60, 30)[1..]));
+    library
+}
+
+/// A run at a depth that takes a while, once a worker is set to the model.
+fn start_slowly(library: &Library) -> Child {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_brickmend"));
+    command.arg("batch").arg(library.models()).arg("-o").arg(library.results());
+    command.args(["--depth", "9", "--max-memory", "256MiB", "--jobs", "1", "--quiet"]);
+    let mut child = command.spawn().expect("the program starts");
+    let begun = Instant::now();
+    while begun.elapsed() < Duration::from_secs(30) {
+        // The journal may not be there yet.
+        let journal = Journal::open_to_read(&library.results());
+        if let Ok(Ok(summary)) = journal.map(|mut journal| journal.summary())
+            && !summary.under_way.is_empty()
+        {
+            return child;
+        }
+        std::thread::sleep(Duration::from_millis(10));
+    }
+    kill(&mut child);
+    panic!("no worker was set to the model");
+}
+
+/// Processes whose parent is this one.
+fn children_of(parent: u32) -> Vec<Pid> {
+    let parent_of = |pid: i32| -> Option<u32> {
+        let stat = std::fs::read_to_string(format!("/proc/{pid}/stat")).ok()?;
+        stat.rsplit_once(')')?.1.split_whitespace().nth(1)?.parse().ok()
+    };
+    let entries = std::fs::read_dir("/proc").expect("Linux").flatten();
+    let pids = entries.filter_map(|entry| entry.file_name().to_str()?.parse::<i32>().ok());
+    pids.filter(|&pid| parent_of(pid) == Some(parent)).filter_map(Pid::from_raw).collect()
+}
+
+#[test]
+fn a_worker_that_is_killed_is_an_outcome_of_its_model() {
+    let library = slow_library();
+    let mut batch = start_slowly(&library);
+    // A worker may not have been started when the attempt is noted.
+    let mut workers = children_of(batch.id());
+    while workers.is_empty() && batch.try_wait().expect("it is ours").is_none() {
+        workers = children_of(batch.id());
+    }
+    assert!(!workers.is_empty(), "the model takes longer than this");
+    for worker in workers {
+        kill_process(worker, Signal::KILL).expect("it is of our run");
+    }
+    assert_eq!(batch.wait().expect("it is ours").code(), Some(0));
+    let why = library.why("slow.obj");
+    assert_eq!(why["attempts"][0]["ending"], "memory", "{why}");
+    assert_eq!(why["attempts"][1]["ending"], "repaired", "{why}");
+}
+
+#[test]
+fn a_batch_that_is_asked_to_stop_leaves_the_model_pending() {
+    let library = slow_library();
+    let mut batch = start_slowly(&library);
+    let pid = Pid::from_raw(i32::try_from(batch.id()).expect("small")).expect("a process");
+    kill_process(pid, Signal::TERM).expect("it is ours");
+    assert_eq!(batch.wait().expect("it is ours").code(), Some(143));
+    let why = library.why("slow.obj");
+    assert_eq!(why["state"], "pending", "{why}");
+    assert_eq!(why["attempts"][0]["ending"], "stopped", "{why}");
 }

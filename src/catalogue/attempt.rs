@@ -1,5 +1,6 @@
 //! One attempt at a model: what its worker is given, and what its end means.
 
+use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
 use crate::catalogue::CatalogueError;
@@ -9,7 +10,7 @@ use crate::catalogue::journal::ModelRow;
 use crate::catalogue::options::{BatchOptions, Wanted};
 use crate::catalogue::state::{Cause, Rung};
 use crate::repair::{Depth, Settings, floor_bytes};
-use crate::store::StoreError;
+use crate::store::{Digester, StoreError};
 
 /// This process: the program, the journal's cache, numbers of models.
 const OWN_BYTES: u64 = 40 << 20;
@@ -46,7 +47,7 @@ impl Place {
     /// Shares out what the batch may use; `own` is the folder of the catalogue's own files.
     ///
     /// # Errors
-    /// [`CatalogueError::BudgetBelowFloor`].
+    /// [`CatalogueError::BudgetBelowFloor`], or the folder of the results is not there.
     pub fn new(options: &BatchOptions, own: &Path) -> Result<Self, CatalogueError> {
         let (jobs, whole) =
             (options.jobs.max(1), options.max_memory_bytes.saturating_sub(OWN_BYTES));
@@ -62,7 +63,7 @@ impl Place {
         Ok(Self {
             source: options.source.clone(),
             target: options.target.clone(),
-            work: options.work_dir.clone().unwrap_or_else(|| own.join(WORK)),
+            work: work_folder(options, own)?,
             max_disk_bytes: options.max_disk_bytes,
             shared: Grant { memory_bytes: share, threads: (threads / jobs).max(1) },
             alone: Grant { memory_bytes: whole, threads },
@@ -140,6 +141,18 @@ impl Place {
         let settings = coarser(&wanted.settings, row, rung.coarser_levels());
         Ok(Job { task, ..self.job(row, &settings, &folder, self.grant(rung)) })
     }
+}
+
+/// The folder of the work folders. In one that the user names it has a name of its own: what is not
+/// ours is never swept, and two catalogues may share that folder.
+fn work_folder(options: &BatchOptions, own: &Path) -> Result<PathBuf, CatalogueError> {
+    let Some(named) = &options.work_dir else { return Ok(own.join(WORK)) };
+    let target = &options.target;
+    let real = target.canonicalize().map_err(|e| StoreError::io("find the folder", target, e))?;
+    let mut digester = Digester::default();
+    digester.update(real.as_os_str().as_bytes());
+    let name: String = digester.digest().iter().map(|byte| format!("{byte:02x}")).collect();
+    Ok(named.join(format!("brickmend-batch-{name}")))
 }
 
 fn make_folder(folder: PathBuf) -> Result<PathBuf, CatalogueError> {
