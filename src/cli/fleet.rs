@@ -1,17 +1,14 @@
 //! A batch on the terminal: one bar for all models, one line for each worker.
 
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
+use std::time::{Instant, SystemTime, UNIX_EPOCH};
 
 use brickmend::catalogue::{Ahead, Ended, Fleet, State};
 use brickmend::monitor::Stage;
 use indicatif::{MultiProgress, ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::cli::progress::{Chatter, on_one_line};
+use crate::cli::progress::{Chatter, LINE_INTERVAL, on_one_line};
 use crate::cli::signals::Stop;
-
-/// Off a terminal, progress is told this often.
-const LINE_INTERVAL: Duration = Duration::from_secs(60);
 
 /// A fleet that draws on the terminal.
 pub struct Terminal {
@@ -71,6 +68,13 @@ impl Fleet for Terminal {
 
     fn cancelled(&self) -> bool {
         self.stop.is_asked()
+    }
+
+    fn looking(&self, done: u64, total: u64) {
+        let state = self.state();
+        state.all.set_length(total);
+        state.all.set_position(done);
+        state.all.set_message("looked at");
     }
 
     fn ahead(&self, ahead: &Ahead) {

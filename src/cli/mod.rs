@@ -12,6 +12,7 @@ mod memory;
 mod progress;
 mod repair;
 mod signals;
+mod stage_clock;
 mod status;
 mod worker;
 
@@ -62,7 +63,7 @@ pub fn run() -> std::process::ExitCode {
         Command::Inspect(arguments) => inspect::run(&arguments, &chatter),
         Command::Batch(arguments) => batch::run(&arguments, &chatter),
         Command::Status(arguments) => status::run(&arguments, &chatter),
-        Command::Worker(arguments) => worker::run(&arguments),
+        Command::Worker(arguments) => worker::run(&arguments, &chatter),
         Command::Estimate(arguments) => estimate::run(&arguments, &chatter),
     }
 }

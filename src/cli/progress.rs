@@ -1,6 +1,6 @@
 //! The terminal: progress by work done, notes, and the seconds of every stage.
 //!
-//! The only home of indicatif. Bars appear on a terminal only; elsewhere one line a minute.
+//! Bars appear on a terminal only; elsewhere one line a minute.
 
 use std::collections::BTreeMap;
 use std::io::{IsTerminal, Write};
@@ -11,11 +11,11 @@ use brickmend::monitor::{Monitor, Stage};
 use brickmend::repair::StageReport;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 
-use crate::cli::memory::cpu_seconds;
 use crate::cli::signals::Stop;
+use crate::cli::stage_clock::StageClock;
 
 /// Off a terminal, progress is told this often.
-const LINE_INTERVAL: Duration = Duration::from_secs(60);
+pub const LINE_INTERVAL: Duration = Duration::from_secs(60);
 
 /// How much is said, and where.
 #[derive(Clone, Copy, Debug)]
@@ -40,7 +40,7 @@ impl Chatter {
         self.verbose > 0
     }
 
-    /// Whether there is a terminal to draw on.
+    /// Whether bars are drawn.
     pub fn has_bars(self) -> bool {
         self.bars
     }
@@ -99,10 +99,7 @@ pub struct Progress {
 
 struct State {
     bar: ProgressBar,
-    stage: Option<(Stage, Instant, f64)>,
-    seconds: BTreeMap<Stage, StageReport>,
-    total: u64,
-    done: u64,
+    clock: StageClock,
     last_line: Instant,
 }
 
@@ -113,20 +110,13 @@ impl Progress {
         let bar = ProgressBar::with_draw_target(Some(0), target);
         let style = ProgressStyle::with_template("{msg:8} [{bar:30}] {percent:>3} % {elapsed}");
         bar.set_style(style.unwrap_or_else(|_| ProgressStyle::default_bar()));
-        let state = State {
-            bar,
-            stage: None,
-            seconds: BTreeMap::new(),
-            total: 0,
-            done: 0,
-            last_line: Instant::now(),
-        };
+        let state = State { bar, clock: StageClock::default(), last_line: Instant::now() };
         Self { chatter, stop, state: Mutex::new(state) }
     }
 
     /// Seconds of every stage so far.
     pub fn stages(&self) -> BTreeMap<Stage, StageReport> {
-        self.state().seconds.clone()
+        self.state().clock.reports()
     }
 
     /// Takes the bar off the terminal.
@@ -142,8 +132,7 @@ impl Progress {
 impl Monitor for Progress {
     fn begin(&self, stage: Stage, total: u64) {
         let mut state = self.state();
-        state.stage = Some((stage, Instant::now(), cpu_seconds()));
-        (state.total, state.done) = (total, 0);
+        state.clock.begin(stage, total);
         state.bar.set_length(total);
         state.bar.set_position(0);
         state.bar.set_message(stage.name());
@@ -151,26 +140,19 @@ impl Monitor for Progress {
 
     fn advance(&self, done: u64) {
         let mut state = self.state();
-        state.done += done;
-        state.bar.set_position(state.done);
+        state.clock.advance(done);
+        state.bar.set_position(state.clock.done());
         if !self.chatter.bars && state.last_line.elapsed() >= LINE_INTERVAL {
             state.last_line = Instant::now();
-            if let Some((stage, ..)) = state.stage
-                && state.total > 0
-            {
-                let percent = 100 * state.done.min(state.total) / state.total;
-                self.chatter.say(&format!("{}: {percent} %", stage.name()));
+            if let Some((stage, share)) = state.clock.share() {
+                self.chatter.say(&format!("{}: {:.0} %", stage.name(), (100.0 * share).floor()));
             }
         }
     }
 
     fn end(&self, stage: Stage) {
         let mut state = self.state();
-        if let Some((_, start, cpu)) = state.stage.take() {
-            let seconds = start.elapsed().as_secs_f64();
-            let report = state.seconds.entry(stage).or_default();
-            report.seconds += seconds;
-            report.cpu_seconds += cpu_seconds() - cpu;
+        if let Some(seconds) = state.clock.end(stage) {
             self.chatter.detail(&format!("{}: {seconds:.3} s", stage.name()));
         }
     }
