@@ -181,6 +181,19 @@ fn results_of_one_name_are_told_apart() {
 }
 
 #[test]
+fn a_list_names_the_models_by_whatever_bytes() {
+    let library = Library::new();
+    let list = library.folder.path().join("list");
+    std::fs::write(&list, b"a/na\xffme.obj\nc/1.obj\r\n\ngone.obj\n").expect("writable");
+    let list = list.to_str().expect("text");
+    let (code, summary) = library.batch(&["--files-from", list]);
+    assert_eq!((code, count(&summary, "repaired")), (0, 2), "{summary}");
+    // What is planned only is not done.
+    let (code, summary) = library.batch(&["--plan"]);
+    assert_eq!((code, count(&summary, "repaired"), count(&summary, "pending")), (0, 2, 8));
+}
+
+#[test]
 fn two_batches_on_one_folder_do_not_meet() {
     let library = Library::new();
     let own = library.results().join(".brickmend");

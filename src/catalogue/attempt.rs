@@ -1,5 +1,6 @@
 //! One attempt at a model: what its worker is given, and what its end means.
 
+use std::io::ErrorKind;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 
@@ -105,6 +106,23 @@ impl Place {
     /// It cannot be made.
     pub fn folder_of_slot(&self, slot: usize) -> Result<PathBuf, CatalogueError> {
         make_folder(self.work.join(format!("slot-{slot}")))
+    }
+
+    /// Removes the folders that readers spilled into.
+    ///
+    /// # Errors
+    /// One cannot be removed.
+    pub fn remove_slots(&self, slots: usize) -> Result<(), CatalogueError> {
+        for slot in 0..slots {
+            let folder = self.work.join(format!("slot-{slot}"));
+            match std::fs::remove_dir_all(&folder) {
+                Err(error) if error.kind() != ErrorKind::NotFound => {
+                    return Err(StoreError::io("remove", &folder, error).into());
+                }
+                _ => {}
+            }
+        }
+        Ok(())
     }
 
     /// A job to repair a model.

@@ -1,7 +1,7 @@
 //! A worker process from outside: started, listened to, stopped in time.
 //!
-//! In:         a [`Job`]. Out: [`Exited`]: how the process ended and what it said.
-//! Invariant:  no process outlives the call. A worker that is asked to stop has time to save its
+//! In:         [`Job`]s. Out: their [`Ending`]s, and [`Exited`]: how the process ended.
+//! Invariant:  no process outlives its [`Worker`]. A worker that is asked to stop has time to save its
 //!             state, and is killed after that. It is in a process group of its own, so that what
 //!             stops the batch from the terminal does not stop it twice.
 //! Memory:     the last lines of what the worker says on stderr.
@@ -10,7 +10,8 @@
 use std::io::{BufRead, BufReader, Read, Write};
 use std::os::unix::process::{CommandExt, ExitStatusExt};
 use std::path::Path;
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Child, ChildStdin, Command, Stdio};
+use std::thread::JoinHandle;
 use std::time::Duration;
 
 use crossbeam::channel::{Receiver, RecvTimeoutError, Sender, unbounded};
@@ -65,89 +66,120 @@ pub struct Watch<'w> {
     pub working: &'w (dyn Fn(Stage, f64) + Sync),
 }
 
-/// Sets a worker to a job and waits for its end.
-///
-/// # Errors
-/// [`CatalogueError::Worker`].
-pub fn run_child(program: &Path, job: &Job, watch: &Watch) -> Result<Exited, CatalogueError> {
-    let mut child = start(program)?;
-    let mut words = child.stdin.take().expect("the worker's input is a pipe");
-    let line = serde_json::to_string(job).expect("plain records serialise");
-    // A worker that died before it read has its end told below.
-    let _ = writeln!(words, "{line}");
-    drop(words);
-    let (sender, reports) = unbounded();
-    let (output, errors) = (child.stdout.take(), child.stderr.take());
-    std::thread::scope(|scope| {
-        scope.spawn(move || output.map(|output| hand_on(output, &sender)));
-        let last_words = scope.spawn(move || errors.map(last_words_of).unwrap_or_default());
-        let (ending, asked) = listen(&child, &reports, watch);
-        let status = child.wait();
-        let last_words = last_words.join().unwrap_or_default();
-        Ok(exited(status.ok(), ending, asked, last_words))
-    })
+/// A worker process that waits for jobs. Dropped, it is killed.
+pub struct Worker {
+    child: Child,
+    words: Option<ChildStdin>,
+    reports: Receiver<Report>,
+    last_words: Option<JoinHandle<String>>,
 }
 
-/// Starts a worker that waits for jobs.
-pub(super) fn start(program: &Path) -> Result<Child, CatalogueError> {
-    Command::new(program)
-        .arg(WORKER)
-        .arg(std::process::id().to_string())
-        .stdin(Stdio::piped())
-        .stdout(Stdio::piped())
-        .stderr(Stdio::piped())
-        .process_group(0)
-        .spawn()
-        .map_err(|source| CatalogueError::Worker { program: program.to_path_buf(), source })
-}
+impl Worker {
+    /// Starts one.
+    ///
+    /// # Errors
+    /// [`CatalogueError::Worker`].
+    pub fn start(program: &Path) -> Result<Self, CatalogueError> {
+        let mut child = Command::new(program)
+            .arg(WORKER)
+            .arg(std::process::id().to_string())
+            .stdin(Stdio::piped())
+            .stdout(Stdio::piped())
+            .stderr(Stdio::piped())
+            .process_group(0)
+            .spawn()
+            .map_err(|source| CatalogueError::Worker { program: program.to_path_buf(), source })?;
+        let pipe = "the worker's ends are pipes";
+        let (output, errors) = (child.stdout.take().expect(pipe), child.stderr.take().expect(pipe));
+        let (sender, reports) = unbounded();
+        std::thread::spawn(move || hand_on(output, &sender));
+        let last_words = Some(std::thread::spawn(move || last_words_of(errors)));
+        Ok(Self { words: child.stdin.take(), child, reports, last_words })
+    }
 
-fn exited(
-    status: Option<ExitStatus>,
-    ending: Option<Ending>,
-    asked: Option<Asked>,
-    last_words: String,
-) -> Exited {
-    let code = status.and_then(|status| status.code());
-    let signal = status.and_then(|status| status.signal());
-    Exited { ending, code, signal, asked, last_words }
-}
+    /// Hands over a job and waits for what comes of it; `None` if the worker ends before.
+    pub fn ask(&mut self, job: &Job, watch: &Watch) -> Option<Ending> {
+        self.say(job);
+        self.listen(watch, true).0
+    }
 
-/// Listens until the worker has closed its end.
-fn listen(
-    child: &Child,
-    reports: &Receiver<Report>,
-    watch: &Watch,
-) -> (Option<Ending>, Option<Asked>) {
-    let (mut ending, mut asked) = (None, None);
-    let mut killed_at_ms = u64::MAX;
-    loop {
-        match reports.recv_timeout(LOOK_INTERVAL) {
-            Ok(Report::Working { stage, share }) => (watch.working)(stage, share),
-            Ok(Report::Ended(end)) => ending = Some(*end),
-            Err(RecvTimeoutError::Timeout) => {}
-            Err(RecvTimeoutError::Disconnected) => return (ending, asked),
+    /// Hands over the last job and waits for the worker's end.
+    #[must_use]
+    pub fn ask_last(mut self, job: &Job, watch: &Watch) -> Exited {
+        self.say(job);
+        self.words = None;
+        let (ending, asked) = self.listen(watch, false);
+        let status = self.child.wait().ok();
+        let last_words = self.last_words.take().and_then(|thread| thread.join().ok());
+        Exited {
+            ending,
+            code: status.and_then(|status| status.code()),
+            signal: status.and_then(|status| status.signal()),
+            asked,
+            last_words: last_words.unwrap_or_default(),
         }
-        let now_ms = (watch.now_ms)();
-        if asked.is_none() {
-            if (watch.stops)() {
-                asked = Some(Asked::BatchStops);
-            } else if watch.deadline_ms.is_some_and(|deadline| now_ms >= deadline) {
-                asked = Some(Asked::TimeUp);
+    }
+
+    fn say(&mut self, job: &Job) {
+        let line = serde_json::to_string(job).expect("plain records serialise");
+        if let Some(words) = &mut self.words {
+            // A worker that died before it read has its end told by its silence.
+            let _ = writeln!(words, "{line}");
+        }
+    }
+
+    /// Listens until the worker has closed its end, or up to the end of one job.
+    fn listen(&self, watch: &Watch, of_one_job: bool) -> (Option<Ending>, Option<Asked>) {
+        let (mut ending, mut asked) = (None, None);
+        let mut killed_at_ms = u64::MAX;
+        loop {
+            match self.reports.recv_timeout(LOOK_INTERVAL) {
+                Ok(Report::Working { stage, share }) => (watch.working)(stage, share),
+                Ok(Report::Ended(end)) => {
+                    ending = Some(*end);
+                    if of_one_job {
+                        return (ending, asked);
+                    }
+                }
+                Err(RecvTimeoutError::Timeout) => {}
+                Err(RecvTimeoutError::Disconnected) => return (ending, asked),
             }
-            if asked.is_some() {
-                send(child, Signal::TERM);
-                killed_at_ms = now_ms + GRACE_MS;
+            let now_ms = (watch.now_ms)();
+            if asked.is_none() {
+                asked = watch.reason_to_stop(now_ms);
+                if asked.is_some() {
+                    self.send(Signal::TERM);
+                    killed_at_ms = now_ms + GRACE_MS;
+                }
+            } else if now_ms >= killed_at_ms {
+                self.send(Signal::KILL);
             }
-        } else if now_ms >= killed_at_ms {
-            send(child, Signal::KILL);
+        }
+    }
+
+    /// One that is gone already hears nothing.
+    fn send(&self, signal: Signal) {
+        if let Some(pid) = Pid::from_raw(self.child.id() as i32) {
+            let _ = kill_process(pid, signal);
         }
     }
 }
 
-/// A worker that is gone already hears nothing.
-fn send(child: &Child, signal: Signal) {
-    if let Some(pid) = Pid::from_raw(child.id() as i32) {
-        let _ = kill_process(pid, signal);
+impl Drop for Worker {
+    fn drop(&mut self) {
+        // One that is gone already cannot be killed, and has been waited for.
+        let _ = self.child.kill();
+        let _ = self.child.wait();
+    }
+}
+
+impl Watch<'_> {
+    fn reason_to_stop(&self, now_ms: u64) -> Option<Asked> {
+        if (self.stops)() {
+            Some(Asked::BatchStops)
+        } else {
+            self.deadline_ms.filter(|deadline| now_ms >= *deadline).map(|_| Asked::TimeUp)
+        }
     }
 }
 

@@ -6,6 +6,7 @@ use std::io::{BufRead, BufReader, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
+use crate::catalogue::stamp::Stamp;
 use crate::io::{Format, ReadOptions, format_of_name};
 use crate::monitor::Monitor;
 use crate::repair::{Blame, Limits, MemoryPlan, RepairError};
@@ -37,10 +38,11 @@ pub fn copy_if_sound(
     {
         return Ok(false);
     }
+    let before = Stamp::at(input);
     if names_others(input, format) || !is_sound(input, limits, monitor)? {
         return Ok(false);
     }
-    copy(input, output, limits)?;
+    copy((input, before), output, limits)?;
     Ok(true)
 }
 
@@ -87,7 +89,11 @@ fn is_sound(input: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<bool
 }
 
 /// Through a file in the work folder if that is on the same file system, else one beside the output.
-fn copy(input: &Path, output: &Path, limits: &Limits) -> Result<(), RepairError> {
+fn copy(
+    (input, before): (&Path, Option<Stamp>),
+    output: &Path,
+    limits: &Limits,
+) -> Result<(), RepairError> {
     let parent = output.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let device = |folder: &Path| std::fs::metadata(folder).map(|folder| folder.dev()).ok();
     let work = limits.work_dir.as_deref().filter(|folder| device(folder) == device(parent));
@@ -100,8 +106,12 @@ fn copy(input: &Path, output: &Path, limits: &Limits) -> Result<(), RepairError>
             parent.join(hidden)
         }
     };
-    let copied = copy_to(input, &part).and_then(|()| {
-        std::fs::rename(&part, output).map_err(|e| StoreError::io("put in place", output, e))
+    let copied = copy_to(input, &part).map_err(RepairError::from).and_then(|()| {
+        if Stamp::at(input) != before {
+            return Err(RepairError::InputChanged { path: input.to_path_buf() });
+        }
+        let placed = std::fs::rename(&part, output);
+        Ok(placed.map_err(|e| StoreError::io("put in place", output, e))?)
     });
     if copied.is_err() {
         // What is left of it is of no use; that it cannot be removed changes nothing.

@@ -12,7 +12,7 @@ use serde::{Deserialize, Serialize};
 use crate::catalogue::stamp::Stamped;
 use crate::io::Format;
 use crate::monitor::Stage;
-use crate::repair::{Blame, Estimate, Outcome, Settings};
+use crate::repair::{Blame, Estimate, Outcome, Settings, Verdict};
 
 /// A path with any bytes; JSON alone would lose those that are no text.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -101,11 +101,11 @@ pub struct Ending {
 #[serde(tag = "made", rename_all = "snake_case")]
 pub enum Made {
     /// What a repair would take.
-    Estimate(Box<Estimate>),
+    Estimate(Predicted),
     /// The model was repaired.
     Repaired {
         /// What came of it.
-        outcome: Box<Outcome>,
+        figures: Box<Figures>,
         /// The files that were put in place.
         files: Vec<OutputFile>,
     },
@@ -123,6 +123,92 @@ pub enum Made {
         /// Whether a disk is full: other models will meet the same.
         is_disk_full: bool,
     },
+}
+
+impl Made {
+    /// Whether the worker was asked to stop.
+    #[must_use]
+    pub const fn is_stopped(&self) -> bool {
+        matches!(self, Self::Nothing { blame: Blame::Interrupted, .. })
+    }
+}
+
+/// What a model will take.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Predicted {
+    /// Expected.
+    pub seconds: f64,
+    /// At most.
+    pub memory_bytes: u64,
+    /// At most.
+    pub disk_bytes: u64,
+    /// Expected.
+    pub leaf_cells: u64,
+    /// Of the grid.
+    pub depth: u32,
+}
+
+impl Predicted {
+    /// What an estimate says.
+    #[must_use]
+    pub fn of(estimate: &Estimate) -> Self {
+        Self {
+            // JSON has no infinity.
+            seconds: estimate.seconds.min(f64::MAX),
+            memory_bytes: estimate.memory_bytes,
+            disk_bytes: estimate.disk_bytes,
+            leaf_cells: estimate.leaf_cells,
+            depth: estimate.grid.depth,
+        }
+    }
+}
+
+/// What of an outcome has columns in the journal, and the whole of it as text. Numbers that JSON
+/// cannot hold are not there.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Figures {
+    /// How good the result is.
+    pub verdict: Verdict,
+    /// What a person should look at.
+    pub reasons: Vec<String>,
+    /// Of the grid.
+    pub depth: u32,
+    /// Triangles of the input.
+    pub triangles_before: u64,
+    /// Triangles of the result.
+    pub triangles_after: u64,
+    /// Edges of an odd number of triangles in the input.
+    pub open_edges_before: u64,
+    /// Triangles of the input that are copies of others.
+    pub duplicates_before: u64,
+    /// Openings of the input.
+    pub openings_before: u64,
+    /// Area of the result over that of the input.
+    pub area_ratio: Option<f64>,
+    /// Volume of the result, cubic model units.
+    pub volume: Option<f64>,
+    /// The outcome, as JSON.
+    pub outcome: String,
+}
+
+impl Figures {
+    /// Of an outcome.
+    #[must_use]
+    pub fn of(outcome: &Outcome) -> Self {
+        Self {
+            verdict: outcome.verdict,
+            reasons: outcome.reasons.clone(),
+            depth: outcome.grid.depth,
+            triangles_before: outcome.input.stats.triangles,
+            triangles_after: outcome.output.proof.triangles,
+            open_edges_before: outcome.found.settle.rim_edges,
+            duplicates_before: outcome.found.settle.duplicate_triangles,
+            openings_before: outcome.found.openings,
+            area_ratio: Some(outcome.output.area_ratio),
+            volume: Some(outcome.output.proof.volume),
+            outcome: serde_json::to_string(outcome).expect("plain records serialise"),
+        }
+    }
 }
 
 /// A file that was put in place.

@@ -18,6 +18,7 @@ mod job;
 mod journal;
 mod names;
 mod options;
+mod pace;
 mod predict;
 mod prepare;
 mod run;
@@ -30,10 +31,9 @@ pub use child::WORKER;
 pub use copy::copy_if_sound;
 pub use error::CatalogueError;
 pub use fleet::{Ahead, Ended, Fleet};
-pub use job::{Ending, Job, Made, OutputFile, RawPath, Report, Task};
+pub use job::{Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Report, Task};
 pub use journal::{
-    AttemptRow, FOLDER, Failure, JOURNAL, Journal, ModelRow, Predicted, StateCount, Summary, Told,
-    UnderWay,
+    AttemptRow, FOLDER, Failure, JOURNAL, Journal, ModelRow, StateCount, Summary, Told, UnderWay,
 };
 pub use options::{BatchOptions, Retry, Wanted};
 pub use run::RunEnding;
@@ -58,6 +58,8 @@ pub struct BatchReport {
     pub ending: Option<RunEnding>,
     /// What there was to do.
     pub ahead: Ahead,
+    /// Models of this run that have no result: they failed, or are still to be done.
+    pub without_results: u64,
     /// Where the catalogue stands now.
     pub summary: Summary,
 }
@@ -83,7 +85,8 @@ pub fn run_batch(options: &BatchOptions, fleet: &dyn Fleet) -> Result<BatchRepor
     let noted = journal.end_run(run, name, fleet.now_ms());
     let (ending, ahead) = done?;
     noted?;
-    Ok(BatchReport { ending, ahead, summary: journal.summary()? })
+    let without_results = journal.without_results(run)?;
+    Ok(BatchReport { ending, ahead, without_results, summary: journal.summary()? })
 }
 
 fn go_through(
@@ -94,8 +97,7 @@ fn go_through(
     fleet: &dyn Fleet,
 ) -> Result<(Option<RunEnding>, Ahead), CatalogueError> {
     let prepared = prepare(journal, run, options, fleet)?;
-    let pending = journal.pending(run)?;
-    sweep(place, &pending)?;
+    sweep(place, &journal.with_work()?)?;
     let unpredicted = journal.unpredicted(run)?;
     predict(journal, &unpredicted, place, options, fleet)?;
     let pending = journal.pending(run)?.len() as u64;
@@ -104,7 +106,7 @@ fn go_through(
         passed: prepared.passed,
         settled: prepared.found.saturating_sub(pending),
         pending,
-        seconds: journal.summary()?.pending_seconds,
+        seconds: journal.pending_seconds(run)?,
     };
     if prepared.enrolled.told_apart > 0 {
         let told = prepared.enrolled.told_apart;
@@ -135,16 +137,14 @@ fn keep_apart(options: &BatchOptions) -> Result<(), CatalogueError> {
     Ok(())
 }
 
-/// Removes what is left of the work on models that are not pending.
-fn sweep(place: &Place, pending: &[i64]) -> Result<(), CatalogueError> {
+/// Removes what is left of the work on models but those in `kept`, in ascending order.
+fn sweep(place: &Place, kept: &[i64]) -> Result<(), CatalogueError> {
     let Ok(entries) = std::fs::read_dir(place.work()) else { return Ok(()) };
-    let mut sorted = pending.to_vec();
-    sorted.sort_unstable();
     for entry in entries.flatten() {
         let name = entry.file_name();
         let model = name.to_str().and_then(|name| name.parse::<i64>().ok());
         let is_slot = name.to_str().is_some_and(|name| name.starts_with("slot-"));
-        let is_over = model.is_some_and(|id| sorted.binary_search(&id).is_err());
+        let is_over = model.is_some_and(|id| kept.binary_search(&id).is_err());
         if is_slot || is_over {
             let path = entry.path();
             std::fs::remove_dir_all(&path).map_err(|e| StoreError::io("remove", &path, e))?;

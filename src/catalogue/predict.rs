@@ -3,25 +3,25 @@
 //! In:         numbers of models. Out: their predictions in the journal; models that cannot be read
 //!             at all are settled there.
 //! Invariant:  a model on which a worker dies stays without prediction, and the others are told.
-//! Memory:     as many workers as in the run, each with its share.
+//! Memory:     as many workers as in the run, each with its share; rows of a few models.
 //! Fails:      [`CatalogueError`].
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-
-use crossbeam::channel::{Sender, bounded};
+use crossbeam::channel::{Receiver, Sender, bounded, unbounded};
 
 use crate::catalogue::CatalogueError;
 use crate::catalogue::attempt::Place;
-use crate::catalogue::child::{Watch, run_child};
+use crate::catalogue::child::{Watch, Worker};
 use crate::catalogue::fleet::Fleet;
 use crate::catalogue::job::{Job, Made, Task};
-use crate::catalogue::journal::{Finished, Journal, ModelRow, Predicted};
+use crate::catalogue::journal::{Finished, Journal, ModelRow};
 use crate::catalogue::options::BatchOptions;
 use crate::catalogue::state::{Cause, State};
 use crate::store::StoreError;
 
 /// A model that stands still while it is read longer than this is told by its repair.
 const PATIENCE_MS: u64 = 600_000;
+/// Models that wait for a worker.
+const AHEAD: usize = 16;
 
 /// Predicts what the models `ids` will take, and settles those that cannot be read.
 ///
@@ -34,74 +34,90 @@ pub fn predict(
     options: &BatchOptions,
     fleet: &dyn Fleet,
 ) -> Result<(), CatalogueError> {
-    let mut rows = Vec::with_capacity(ids.len());
-    for &id in ids {
-        rows.push(journal.model(id)?);
-    }
-    let next = AtomicUsize::new(0);
-    let (sender, answers) = bounded(64);
+    let stops = || fleet.cancelled() || options.stop_at_ms.is_some_and(|at| fleet.now_ms() >= at);
+    let (rows, questions) = bounded(AHEAD);
+    let (answers, answered) = unbounded();
     std::thread::scope(|scope| {
-        for slot in 0..options.jobs {
-            let (sender, next, rows) = (sender.clone(), &next, &rows);
-            scope.spawn(move || ask(slot, rows, next, place, options, fleet, &sender));
+        for slot in 0..options.jobs.min(ids.len()) {
+            let asking = Asking { slot, place, options, fleet, stops: &stops };
+            let (questions, answers) = (questions.clone(), answers.clone());
+            scope.spawn(move || asking.ask_all(&questions, &answers));
         }
-        drop(sender);
-        let mut entered = Ok(());
-        for (done, answer) in answers.iter().enumerate() {
-            fleet.looking(done as u64, rows.len() as u64);
-            if entered.is_ok() {
-                entered = answer.and_then(|(id, made)| enter(journal, id, &made, fleet));
-                if entered.is_err() {
-                    // The workers' threads find nothing more to do.
-                    next.store(rows.len(), Ordering::Relaxed);
+        drop((questions, answers));
+        let mut left = ids.iter();
+        let mut rows = Some(rows);
+        let mut done = 0;
+        loop {
+            // As many questions are under way as there is room for.
+            while let Some(sender) = rows.as_ref().filter(|sender| !sender.is_full()) {
+                match left.next().filter(|_| !stops()) {
+                    Some(&id) => {
+                        // Where all workers' threads ended, their answers say why.
+                        let _ = sender.send(journal.model(id)?);
+                    }
+                    None => rows = None,
                 }
             }
+            let Ok(answer) = answered.recv() else { return Ok::<(), CatalogueError>(()) };
+            let (id, made) = answer?;
+            enter(journal, id, &made, fleet)?;
+            done += 1;
+            fleet.looking(done, ids.len() as u64);
         }
-        entered
     })?;
+    place.remove_slots(options.jobs)?;
     if fleet.cancelled() { Err(StoreError::Cancelled.into()) } else { Ok(()) }
 }
 
 type Answer = Result<(i64, Option<Made>), CatalogueError>;
 
-/// Sets one worker after another to the models that are left.
-fn ask(
+/// One worker after another that is asked.
+struct Asking<'a> {
     slot: usize,
-    rows: &[ModelRow],
-    next: &AtomicUsize,
-    place: &Place,
-    options: &BatchOptions,
-    fleet: &dyn Fleet,
-    answers: &Sender<Answer>,
-) {
-    while !fleet.cancelled() {
-        let Some(row) = rows.get(next.fetch_add(1, Ordering::Relaxed)) else { return };
-        let answer = predict_one(slot, row, place, options, fleet);
-        if answers.send(answer.map(|made| (row.id, made))).is_err() {
-            return;
-        }
-    }
+    place: &'a Place,
+    options: &'a BatchOptions<'a>,
+    fleet: &'a dyn Fleet,
+    stops: &'a (dyn Fn() -> bool + Sync),
 }
 
-fn predict_one(
-    slot: usize,
-    row: &ModelRow,
-    place: &Place,
-    options: &BatchOptions,
-    fleet: &dyn Fleet,
-) -> Result<Option<Made>, CatalogueError> {
-    let wanted = (options.wanted)(&row.relative);
-    let task = Task::Estimate;
-    let folder = place.folder_of_slot(slot)?;
-    let job = Job { task, ..place.job(row, &wanted.settings, &folder, place.shared()) };
-    let limit_ms = options.model_timeout_ms.unwrap_or(u64::MAX).min(PATIENCE_MS);
-    let watch = Watch {
-        now_ms: &|| fleet.now_ms(),
-        deadline_ms: Some(fleet.now_ms().saturating_add(limit_ms)),
-        stops: &|| fleet.cancelled(),
-        working: &|_, _| {},
-    };
-    Ok(run_child(&options.program, &job, &watch)?.ending.map(|ending| ending.made))
+impl Asking<'_> {
+    fn ask_all(&self, questions: &Receiver<ModelRow>, answers: &Sender<Answer>) {
+        let mut worker = None;
+        for row in questions {
+            let answer = self.ask(&mut worker, &row).map(|made| (row.id, made));
+            if answers.send(answer).is_err() {
+                return;
+            }
+        }
+    }
+
+    /// What a model will take; `None` where its worker died or had to be stopped.
+    fn ask(
+        &self,
+        worker: &mut Option<Worker>,
+        row: &ModelRow,
+    ) -> Result<Option<Made>, CatalogueError> {
+        let wanted = (self.options.wanted)(&row.relative);
+        let folder = self.place.folder_of_slot(self.slot)?;
+        let job = self.place.job(row, &wanted.settings, &folder, self.place.shared());
+        let job = Job { task: Task::Estimate, ..job };
+        let limit_ms = self.options.model_timeout_ms.unwrap_or(u64::MAX).min(PATIENCE_MS);
+        let watch = Watch {
+            now_ms: &|| self.fleet.now_ms(),
+            deadline_ms: Some(self.fleet.now_ms().saturating_add(limit_ms)),
+            stops: self.stops,
+            working: &|_, _| {},
+        };
+        let mut asked = match worker.take() {
+            Some(worker) => worker,
+            None => Worker::start(&self.options.program)?,
+        };
+        let ending = asked.ask(&job, &watch);
+        // One that was stopped, or ended, is of no more use.
+        let is_whole = ending.as_ref().is_some_and(|ending| !ending.made.is_stopped());
+        *worker = is_whole.then_some(asked);
+        Ok(ending.map(|ending| ending.made))
+    }
 }
 
 fn enter(
@@ -111,7 +127,7 @@ fn enter(
     fleet: &dyn Fleet,
 ) -> Result<(), CatalogueError> {
     match made {
-        Some(Made::Estimate(estimate)) => journal.predict(id, &Predicted::of(estimate)),
+        Some(Made::Estimate(predicted)) => journal.predict(id, predicted),
         Some(Made::Nothing { blame, message, .. }) if Cause::from(*blame) == Cause::Input => {
             let finished = Finished {
                 cause: Some(Cause::Input),

@@ -16,11 +16,12 @@ use crossbeam::channel::{RecvTimeoutError, Sender, unbounded};
 
 use crate::catalogue::CatalogueError;
 use crate::catalogue::attempt::{Meaning, Place, meaning};
-use crate::catalogue::child::{Exited, Watch, run_child};
+use crate::catalogue::child::{Exited, Watch, Worker};
 use crate::catalogue::fleet::{Ended, Fleet};
 use crate::catalogue::job::{Job, Made, OutputFile, RawPath};
 use crate::catalogue::journal::{Finished, Journal, ModelRow};
 use crate::catalogue::options::BatchOptions;
+use crate::catalogue::pace::Pace;
 use crate::catalogue::state::{Cause, Rung, State};
 
 /// How often limits are looked at while nothing happens.
@@ -79,10 +80,7 @@ pub struct Workload<'b> {
     running: usize,
     is_alone: bool,
     failures: u64,
-    /// Predicted for what is not finished, and for what is, with what that took.
-    left_seconds: f64,
-    predicted_seconds: f64,
-    actual_seconds: f64,
+    pace: Pace,
     stopping: Option<RunEnding>,
     error: Option<CatalogueError>,
 }
@@ -100,7 +98,7 @@ impl<'b> Workload<'b> {
         fleet: &'b dyn Fleet,
     ) -> Result<Self, CatalogueError> {
         let pending: VecDeque<i64> = journal.pending(run)?.into();
-        let left_seconds = journal.summary()?.pending_seconds;
+        let pace = Pace::new(journal.pending_seconds(run)?, options.jobs);
         Ok(Self {
             journal,
             run,
@@ -113,9 +111,7 @@ impl<'b> Workload<'b> {
             running: 0,
             is_alone: false,
             failures: 0,
-            left_seconds,
-            predicted_seconds: 0.0,
-            actual_seconds: 0.0,
+            pace,
             stopping: None,
             error: None,
         })
@@ -276,11 +272,11 @@ impl<'b> Workload<'b> {
         made: &Made,
         finished: Finished,
     ) -> Result<(), CatalogueError> {
-        let (state, outcome, files) = match made {
-            Made::Repaired { outcome, files } if attempt.rung.coarser_levels() > 0 => {
-                (State::Degraded, Some(&**outcome), files)
+        let (state, figures, files) = match made {
+            Made::Repaired { figures, files } if attempt.rung.coarser_levels() > 0 => {
+                (State::Degraded, Some(&**figures), files)
             }
-            Made::Repaired { outcome, files } => (State::Repaired, Some(&**outcome), files),
+            Made::Repaired { figures, files } => (State::Repaired, Some(&**figures), files),
             Made::Copied { files } => (State::Copied, None, files),
             // A worker that answers what it was not asked.
             Made::Estimate(_) | Made::Nothing { .. } => {
@@ -289,8 +285,8 @@ impl<'b> Workload<'b> {
             }
         };
         let files: Vec<OutputFile> = files.iter().map(|file| self.within(file)).collect();
-        let reason = outcome.map(|outcome| outcome.reasons.join("; ")).filter(|r| !r.is_empty());
-        let finished = Finished { outcome, files: &files, reason, ..finished };
+        let reason = figures.map(|figures| figures.reasons.join("; ")).filter(|r| !r.is_empty());
+        let finished = Finished { figures, files: &files, reason, ..finished };
         self.journal.finish(attempt.row.id, state, &finished)?;
         let (now_ms, seconds) = (finished.now_ms, finished.seconds);
         self.journal.end_attempt(attempt.number, state.name(), None, now_ms)?;
@@ -337,17 +333,8 @@ impl<'b> Workload<'b> {
         reason: Option<&str>,
         seconds: f64,
     ) {
-        let predicted = attempt.row.predicted.map_or(0.0, |predicted| predicted.seconds);
-        if state != State::Pending {
-            self.left_seconds = (self.left_seconds - predicted).max(0.0);
-        }
-        if matches!(state, State::Repaired | State::Degraded) {
-            self.predicted_seconds += predicted;
-            self.actual_seconds += seconds;
-        }
-        let is_known = self.predicted_seconds > 0.0;
-        let pace = if is_known { self.actual_seconds / self.predicted_seconds } else { 1.0 };
-        let left_seconds = self.left_seconds * pace / self.options.jobs.max(1) as f64;
+        self.pace.enter(&attempt.row, state, seconds);
+        let left_seconds = self.pace.seconds_to_go();
         let model = &attempt.row.relative.to_string_lossy();
         self.fleet
             .ended(attempt.slot, &Ended { model, state, cause, reason, seconds, left_seconds });
@@ -382,7 +369,7 @@ fn watch_over(
         stops: &|| stops.load(Ordering::Relaxed),
         working: &|stage, share| fleet.working(slot, stage, share),
     };
-    let exited = run_child(&options.program, job, &watch);
+    let exited = Worker::start(&options.program).map(|worker| worker.ask_last(job, &watch));
     // The one who listens outlives us.
     let _ = events.send((attempt, exited));
 }

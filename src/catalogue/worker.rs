@@ -8,15 +8,16 @@
 use std::path::{Path, PathBuf};
 
 use crate::catalogue::copy::copy_if_sound;
-use crate::catalogue::job::{Ending, Job, Made, OutputFile, RawPath, Task};
-use crate::catalogue::stamp::{Stamp, Stamped};
+use crate::catalogue::job::{Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Task};
+use crate::catalogue::stamp::Stamped;
 use crate::io::{Format, library_name};
 use crate::monitor::Monitor;
 use crate::repair::{Limits, Outcome, RepairError, estimate, repair};
 
-/// Does what `job` asks for. The caller fills in what the kernel knows of the process.
+/// Does what `job` asks for. The caller fills in what the kernel knows of the process, `stamp` what
+/// the caller's monitor knows of a repair.
 #[must_use]
-pub fn do_job(job: &Job, monitor: &dyn Monitor) -> Ending {
+pub fn do_job(job: &Job, monitor: &dyn Monitor, stamp: &dyn Fn(&mut Outcome)) -> Ending {
     let input_path = job.input.to_path();
     let mut input = None;
     let made = match job.task {
@@ -24,7 +25,7 @@ pub fn do_job(job: &Job, monitor: &dyn Monitor) -> Ending {
         Task::Repair | Task::RepairBroken => {
             // Before it is read for the repair: a later change makes the stamp fit no longer.
             input = Stamped::read(&input_path, &|| monitor.cancelled()).ok();
-            make(job, &input_path, monitor)
+            make(job, &input_path, monitor, stamp)
         }
     };
     let made = made.unwrap_or_else(|error| nothing(&error));
@@ -44,23 +45,25 @@ fn limits_of(job: &Job) -> Limits {
 fn predict(job: &Job, input: &Path, monitor: &dyn Monitor) -> Result<Made, RepairError> {
     let limits = limits_of(job);
     let estimate = estimate(input, job.format, &job.settings, &limits, monitor)?;
-    Ok(Made::Estimate(Box::new(estimate)))
+    Ok(Made::Estimate(Predicted::of(&estimate)))
 }
 
-fn make(job: &Job, input: &Path, monitor: &dyn Monitor) -> Result<Made, RepairError> {
+fn make(
+    job: &Job,
+    input: &Path,
+    monitor: &dyn Monitor,
+    stamp: &dyn Fn(&mut Outcome),
+) -> Result<Made, RepairError> {
     let (output, limits) = (job.output.to_path(), limits_of(job));
-    let before = Stamp::at(input);
     if job.task == Task::RepairBroken
         && copy_if_sound(input, &output, job.format, &limits, monitor)?
     {
-        if Stamp::at(input) != before {
-            return Err(RepairError::InputChanged { path: input.to_path_buf() });
-        }
-        return Ok(Made::Copied { files: stamp(&[output])? });
+        return Ok(Made::Copied { files: known_again(&[output])? });
     }
-    let outcome = repair(input, &output, job.format, &job.settings, &limits, monitor)?;
-    let files = stamp(&files_of(&output, job.format, &outcome))?;
-    Ok(Made::Repaired { outcome: Box::new(outcome), files })
+    let mut outcome = repair(input, &output, job.format, &job.settings, &limits, monitor)?;
+    stamp(&mut outcome);
+    let files = known_again(&files_of(&output, job.format, &outcome))?;
+    Ok(Made::Repaired { figures: Box::new(Figures::of(&outcome)), files })
 }
 
 /// The files of a result: beside an OBJ file lies its library.
@@ -75,7 +78,7 @@ fn files_of(output: &Path, format: Format, outcome: &Outcome) -> Vec<PathBuf> {
 }
 
 /// What was put in place is known again by this; stopping now would lose it.
-fn stamp(files: &[PathBuf]) -> Result<Vec<OutputFile>, RepairError> {
+fn known_again(files: &[PathBuf]) -> Result<Vec<OutputFile>, RepairError> {
     let stamped = files.iter().map(|path| {
         Ok(OutputFile { path: RawPath::new(path), stamped: Stamped::read(path, &|| false)? })
     });

@@ -1,7 +1,9 @@
 //! `brickmend batch`: a folder of models, each in a process of its own.
 
+use std::ffi::OsStr;
 use std::io::Write;
-use std::path::PathBuf;
+use std::os::unix::ffi::OsStrExt;
+use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use brickmend::catalogue::{
@@ -10,6 +12,7 @@ use brickmend::catalogue::{
 };
 use brickmend::io::Format;
 use brickmend::repair::Blame;
+use brickmend::store::StoreError;
 use clap::Args;
 
 use crate::cli::arguments::{FormatName, ResourceArguments, ResultArguments, parse_size};
@@ -50,6 +53,9 @@ pub struct BatchArguments {
     /// No models whose path or name fits this pattern; may be given several times.
     #[arg(long, value_name = "PATTERN", help_heading = "Models")]
     exclude: Vec<String>,
+    /// Only the models that this file lists, one path a line, within the folder.
+    #[arg(long, value_name = "FILE", help_heading = "Models")]
+    files_from: Option<PathBuf>,
     /// Only models of this size and larger.
     #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Models")]
     min_size: Option<u64>,
@@ -144,7 +150,7 @@ fn batch(arguments: &BatchArguments, fleet: &Terminal) -> Result<BatchReport, Ca
         target: arguments.output.clone(),
         wanted: &|_| wanted,
         selection: Selection::new(&arguments.include, &arguments.exclude, Some(sizes))?,
-        listed: None,
+        listed: arguments.files_from.as_deref().map(read_list).transpose()?,
         max_memory_bytes: limits.max_memory_bytes,
         max_disk_bytes: arguments.max_disk,
         jobs: arguments.jobs.unwrap_or(limits.threads).max(1),
@@ -162,6 +168,14 @@ fn batch(arguments: &BatchArguments, fleet: &Terminal) -> Result<BatchReport, Ca
     run_batch(&options, fleet)
 }
 
+/// The paths in a file, one a line, whatever bytes they have.
+fn read_list(path: &Path) -> Result<Vec<PathBuf>, CatalogueError> {
+    let bytes = std::fs::read(path).map_err(|e| StoreError::io("read the list", path, e))?;
+    let lines =
+        bytes.split(|&byte| byte == b'\n').map(|line| line.strip_suffix(b"\r").unwrap_or(line));
+    Ok(lines.filter(|line| !line.is_empty()).map(|line| OsStr::from_bytes(line).into()).collect())
+}
+
 fn retry(names: &[RetryName]) -> Retry {
     let has = |name| names.contains(&name);
     let causes = [(RetryName::Timeout, Cause::Timeout), (RetryName::Oom, Cause::Memory)];
@@ -175,12 +189,11 @@ fn retry(names: &[RetryName]) -> Retry {
 }
 
 fn exit_of(report: &BatchReport, stop: &Stop) -> Exit {
-    let has_failures = report.summary.states.iter().any(|count| count.state == "failed");
     match report.ending {
         Some(RunEnding::Stopped) => Exit::Stopped,
         Some(RunEnding::Interrupted) => stop.exit(),
         Some(RunEnding::DiskFull) => Exit::Unusable,
-        Some(RunEnding::Done) if has_failures => Exit::SomeFailed,
+        Some(RunEnding::Done) if report.without_results > 0 => Exit::SomeFailed,
         Some(RunEnding::Done) | None => Exit::Success,
     }
 }

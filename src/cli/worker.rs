@@ -7,8 +7,9 @@ use std::process::ExitCode;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use brickmend::catalogue::{Job, Made, Report, do_job};
+use brickmend::catalogue::{Job, Report, do_job};
 use brickmend::monitor::{Monitor, Stage};
+use brickmend::repair::Outcome;
 use clap::Args;
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
@@ -57,13 +58,13 @@ pub fn run(arguments: &WorkerArguments, chatter: &Chatter) -> ExitCode {
 
 fn work(job: &Job, stop: Stop) {
     let speaker = Speaker::new(stop);
-    let mut ending = do_job(job, &speaker);
+    let stamp = |outcome: &mut Outcome| {
+        outcome.stages = speaker.state().clock.reports();
+        outcome.memory.peak_bytes = peak_resident_bytes();
+    };
+    let mut ending = do_job(job, &speaker, &stamp);
     ending.peak_bytes = peak_resident_bytes();
     ending.cpu_seconds = cpu_seconds();
-    if let Made::Repaired { outcome, .. } = &mut ending.made {
-        outcome.stages = speaker.state().clock.reports();
-        outcome.memory.peak_bytes = ending.peak_bytes;
-    }
     say(&Report::Ended(Box::new(ending)));
 }
 

@@ -56,9 +56,9 @@ const DOUBLES: &str = "
     WHERE wish IN (SELECT wish FROM temp.seen GROUP BY wish HAVING count(*) > 1)";
 
 const NEW: &str = "
-    INSERT INTO model (path, name, output, output_name, format, run_id, state, settings_digest,
+    INSERT INTO model (path, name, output, format, run_id, state, settings_digest,
                        input_bytes, input_mtime_ns, input_ctime_ns, input_inode)
-    SELECT path, name, wish, '', format, ?1, 'pending', settings, bytes, mtime_ns, ctime_ns, inode
+    SELECT path, name, wish, format, ?1, 'pending', settings, bytes, mtime_ns, ctime_ns, inode
     FROM temp.seen WHERE true
     ON CONFLICT (path) DO UPDATE SET run_id = excluded.run_id";
 
@@ -180,8 +180,6 @@ fn settle(connection: &Connection, run: i64, source: &Path) -> rusqlite::Result<
     connection.execute(FORGET_CLASHES, [CLASH])?;
     connection.execute(ASKED_ANEW, ())?;
     connection.execute(PENDING_STAMPS, ())?;
-    let names = "UPDATE model SET output_name = CAST(output AS TEXT) WHERE run_id = ?1";
-    connection.execute(names, [run])?;
     let clashes = refuse_clashes(connection)?;
     let touched = connection
         .prepare(TOUCHED)?

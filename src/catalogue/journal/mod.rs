@@ -9,12 +9,14 @@
 
 mod attempts;
 mod enrol;
+mod finish;
 mod models;
 mod summary;
 
 pub use attempts::AttemptRow;
 pub use enrol::{Enrolled, Seen};
-pub use models::{Finished, ModelRow, Predicted};
+pub use finish::Finished;
+pub use models::ModelRow;
 pub use summary::{Failure, StateCount, Summary, Told, UnderWay};
 
 use std::path::{Path, PathBuf};

@@ -1,17 +1,17 @@
-//! The rows of models: what is to be done, and what came of it.
+//! The rows of models: what is to be done.
 
 use std::path::{Path, PathBuf};
 
 use rusqlite::{OptionalExtension, Row, params};
 
 use crate::catalogue::CatalogueError;
-use crate::catalogue::job::OutputFile;
+use crate::catalogue::job::Predicted;
 use crate::catalogue::journal::Journal;
 use crate::catalogue::journal::enrol::{bytes_of, format_of, path_of, stamp_of};
 use crate::catalogue::stamp::{Stamp, Stamped};
-use crate::catalogue::state::{Cause, State};
+use crate::catalogue::state::State;
 use crate::io::Format;
-use crate::repair::{Estimate, Outcome, Verdict};
+use crate::store::Digest;
 
 /// A model that is to be worked on or looked at.
 #[derive(Clone, Debug, PartialEq)]
@@ -29,61 +29,9 @@ pub struct ModelRow {
     /// The file as it was when it came to that.
     pub stamp: Stamp,
     /// Digest of its content then, once it was read.
-    pub digest: Option<crate::store::Digest>,
+    pub digest: Option<Digest>,
     /// What it will take, once that was estimated.
     pub predicted: Option<Predicted>,
-}
-
-/// What a model will take.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Predicted {
-    /// Expected.
-    pub seconds: f64,
-    /// At most.
-    pub memory_bytes: u64,
-    /// At most.
-    pub disk_bytes: u64,
-    /// Expected.
-    pub leaf_cells: u64,
-    /// Of the grid.
-    pub depth: u32,
-}
-
-impl Predicted {
-    /// What an estimate says.
-    #[must_use]
-    pub fn of(estimate: &Estimate) -> Self {
-        Self {
-            seconds: estimate.seconds,
-            memory_bytes: estimate.memory_bytes,
-            disk_bytes: estimate.disk_bytes,
-            leaf_cells: estimate.leaf_cells,
-            depth: estimate.grid.depth,
-        }
-    }
-}
-
-/// What a model came to.
-#[derive(Clone, Debug, Default)]
-pub struct Finished<'f> {
-    /// The input as it was read; as it was found, where it could not be.
-    pub input: Option<Stamped>,
-    /// Why there is no result.
-    pub cause: Option<Cause>,
-    /// In one line, for people.
-    pub reason: Option<String>,
-    /// Of a repaired model.
-    pub outcome: Option<&'f Outcome>,
-    /// The files of the result.
-    pub files: &'f [OutputFile],
-    /// Now.
-    pub now_ms: u64,
-    /// Wall time of the last attempt.
-    pub seconds: f64,
-    /// Processor time of its worker.
-    pub cpu_seconds: Option<f64>,
-    /// Peak memory of its worker.
-    pub peak_bytes: Option<u64>,
 }
 
 const COLUMNS: &str = "id, path, output, format, state, input_bytes, input_mtime_ns,
@@ -146,6 +94,41 @@ impl Journal {
         let asked = "SELECT id FROM model WHERE run_id = ?1 AND state = 'pending'
             ORDER BY predicted_seconds DESC NULLS LAST, input_bytes DESC, path";
         self.ids(asked, run)
+    }
+
+    /// Seconds that the pending models of a run are expected to take on one worker.
+    ///
+    /// # Errors
+    /// The journal cannot be read.
+    pub fn pending_seconds(&mut self, run: i64) -> Result<f64, CatalogueError> {
+        let asked = "SELECT coalesce(sum(predicted_seconds), 0.0) FROM model
+            WHERE run_id = ?1 AND state = 'pending'";
+        self.with(|connection| connection.query_row(asked, [run], |row| row.get(0)))
+    }
+
+    /// How many models of a run have no result: failed, or still to be done.
+    ///
+    /// # Errors
+    /// The journal cannot be read.
+    pub fn without_results(&mut self, run: i64) -> Result<u64, CatalogueError> {
+        let asked = "SELECT count(*) FROM model WHERE run_id = ?1
+            AND (state IN ('failed', 'pending') OR verdict = 'fail')";
+        let count: i64 =
+            self.with(|connection| connection.query_row(asked, [run], |row| row.get(0)))?;
+        Ok(count as u64)
+    }
+
+    /// Numbers, ascending, of the models whose work folders are of use: it goes on in them, or they
+    /// show a bug of ours.
+    ///
+    /// # Errors
+    /// The journal cannot be read.
+    pub fn with_work(&mut self) -> Result<Vec<i64>, CatalogueError> {
+        let asked =
+            "SELECT id FROM model WHERE state = 'pending' OR cause = 'internal' ORDER BY id";
+        self.with(|connection| {
+            connection.prepare(asked)?.query_map((), |row| row.get(0))?.collect()
+        })
     }
 
     /// Numbers of the pending models of a run of which nothing is predicted.
@@ -284,94 +267,4 @@ impl Journal {
             connection.prepare_cached(update)?.execute(words).map(|_| ())
         })
     }
-
-    /// Notes what a model came to, with its files, as one transaction.
-    ///
-    /// # Errors
-    /// The journal cannot be written.
-    pub fn finish(
-        &mut self,
-        id: i64,
-        state: State,
-        finished: &Finished,
-    ) -> Result<(), CatalogueError> {
-        self.with(|connection| {
-            let transaction = connection.transaction()?;
-            write_row(&transaction, id, state, finished)?;
-            transaction.execute("DELETE FROM output_file WHERE model_id = ?1", [id])?;
-            for file in finished.files {
-                let Stamped { stamp, digest } = file.stamped;
-                transaction
-                    .prepare_cached("INSERT INTO output_file VALUES (?1,?2,?3,?4,?5,?6,?7)")?
-                    .execute(params![
-                        id,
-                        bytes_of(&file.path.to_path()),
-                        stamp.bytes as i64,
-                        stamp.mtime_ns,
-                        stamp.ctime_ns,
-                        stamp.inode as i64,
-                        digest,
-                    ])?;
-            }
-            transaction.commit()
-        })
-    }
-}
-
-const FINISH: &str = "
-    UPDATE model SET state = ?2, verdict = ?3, cause = ?4, reason = ?5, ended_ms = ?6, seconds = ?7,
-        cpu_seconds = ?8, peak_bytes = ?9, triangles_before = ?10, triangles_after = ?11,
-        open_edges_before = ?12, duplicates_before = ?13, openings_before = ?14, area_ratio = ?15,
-        volume = ?16, outcome = ?17, depth = coalesce(?18, depth), attempts = attempts + 1
-    WHERE id = ?1";
-
-const FINISH_INPUT: &str = "
-    UPDATE model SET input_bytes = ?2, input_mtime_ns = ?3, input_ctime_ns = ?4, input_inode = ?5,
-        input_digest = ?6 WHERE id = ?1";
-
-fn write_row(
-    connection: &rusqlite::Connection,
-    id: i64,
-    state: State,
-    finished: &Finished,
-) -> rusqlite::Result<()> {
-    let outcome = finished.outcome;
-    let verdict = outcome.map(|outcome| match outcome.verdict {
-        Verdict::Pass => "pass",
-        Verdict::Review => "review",
-        Verdict::Fail => "fail",
-    });
-    let number = |of: fn(&Outcome) -> u64| outcome.map(|outcome| of(outcome) as i64);
-    connection.prepare_cached(FINISH)?.execute(params![
-        id,
-        state.name(),
-        verdict,
-        finished.cause.map(Cause::name),
-        finished.reason,
-        finished.now_ms as i64,
-        finished.seconds,
-        finished.cpu_seconds,
-        finished.peak_bytes.map(|bytes| bytes as i64),
-        number(|outcome| outcome.input.stats.triangles),
-        number(|outcome| outcome.output.proof.triangles),
-        number(|outcome| outcome.found.settle.rim_edges),
-        number(|outcome| outcome.found.settle.duplicate_triangles),
-        number(|outcome| outcome.found.openings),
-        outcome.map(|outcome| outcome.output.area_ratio),
-        outcome.map(|outcome| outcome.output.proof.volume),
-        outcome.map(|outcome| serde_json::to_string(outcome).expect("plain records serialise")),
-        outcome.map(|outcome| outcome.grid.depth),
-    ])?;
-    if let Some(Stamped { stamp, digest }) = finished.input {
-        let Stamp { bytes, mtime_ns, ctime_ns, inode } = stamp;
-        connection.prepare_cached(FINISH_INPUT)?.execute(params![
-            id,
-            bytes as i64,
-            mtime_ns,
-            ctime_ns,
-            inode as i64,
-            digest,
-        ])?;
-    }
-    Ok(())
 }

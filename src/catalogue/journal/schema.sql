@@ -1,5 +1,5 @@
 -- The journal of a catalogue. Times are milliseconds since 1970, sizes bytes, paths the bytes of
--- the file system (name and output_name are the same as text, to be read by people).
+-- the file system (name is the same as text, to be read by people).
 CREATE TABLE meta (key TEXT PRIMARY KEY, value TEXT NOT NULL) WITHOUT ROWID;
 
 -- One row for each run of the batch.
@@ -20,7 +20,6 @@ CREATE TABLE model (
     path              BLOB NOT NULL UNIQUE,
     name              TEXT NOT NULL,
     output            BLOB NOT NULL,
-    output_name       TEXT NOT NULL,
     format            TEXT NOT NULL,
     run_id            INTEGER NOT NULL,   -- the last run that saw it
     -- pending, copied, repaired, degraded, failed, gone
@@ -43,7 +42,6 @@ CREATE TABLE model (
     predicted_disk    INTEGER,
     predicted_leaves  INTEGER,
     -- what it took
-    attempts          INTEGER NOT NULL DEFAULT 0,
     ended_ms          INTEGER,
     seconds           REAL,
     cpu_seconds       REAL,
@@ -89,7 +87,9 @@ CREATE TABLE attempt (
 CREATE INDEX attempt_model ON attempt (model_id);
 
 CREATE VIEW failures AS
-    SELECT name, cause, reason, attempts, seconds FROM model WHERE state = 'failed' ORDER BY cause, name;
+    SELECT name, cause, reason, seconds,
+           (SELECT count(*) FROM attempt WHERE attempt.model_id = model.id) AS attempts
+    FROM model WHERE state = 'failed' ORDER BY cause, name;
 CREATE VIEW reviews AS
     SELECT name, reason FROM model WHERE verdict = 'review' ORDER BY name;
 CREATE VIEW slowest AS

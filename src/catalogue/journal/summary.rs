@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use crate::catalogue::CatalogueError;
+use crate::catalogue::journal::enrol::path_of;
 use crate::catalogue::journal::{AttemptRow, Journal};
 
 /// How many models stand where.
@@ -183,13 +184,13 @@ impl Journal {
     /// The journal cannot be read.
     pub fn tell(&mut self, id: i64) -> Result<Told, CatalogueError> {
         let attempts = self.attempts(id)?;
-        let asked = "SELECT name, output_name, state, verdict, cause, reason, seconds, peak_bytes
+        let asked = "SELECT name, output, state, verdict, cause, reason, seconds, peak_bytes
             FROM model WHERE id = ?1";
         self.with(|connection| {
             connection.query_row(asked, [id], |row| {
                 Ok(Told {
                     name: row.get(0)?,
-                    output: row.get(1)?,
+                    output: path_of(row, 1)?.to_string_lossy().into_owned(),
                     state: row.get(2)?,
                     verdict: row.get(3)?,
                     cause: row.get(4)?,
