@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::diagnose::Means;
 use crate::diagnose::model::{BLOCK, Model};
-use crate::store::{Labels, Record, Sequence, Sorter, StoreError, Unite};
+use crate::store::{Labels, Record, Sequence, SequencePeek, Sorter, StoreError, Unite};
 
 /// A side of a triangle at an edge.
 #[derive(Clone, Copy, Pod, Zeroable)]
@@ -169,38 +169,23 @@ impl Joining {
 
 /// Reads sides beside the triangles that they belong to.
 pub(crate) struct SideReader<'s> {
-    sides: &'s Sequence<Side>,
-    next: u64,
-    buffer: Vec<Side>,
-    at: usize,
+    sides: SequencePeek<'s, Side>,
 }
 
 impl<'s> SideReader<'s> {
     pub(crate) fn new(sides: &'s Sequence<Side>) -> Self {
-        Self { sides, next: 0, buffer: Vec::new(), at: 0 }
+        Self { sides: SequencePeek::new(sides) }
     }
 
     /// The sides of a triangle, by the corners that they begin at; triangles are asked in order.
     pub(crate) fn of(&mut self, triangle: u64) -> Result<[Option<Side>; 3], StoreError> {
         let mut found = [None; 3];
-        while let Some(side) = self.peek()?
+        while let Some((_, side)) = self.sides.peek()?
             && u64::from(side.side) < triangle * 3 + 3
         {
             found[side.side as usize % 3] = Some(side);
-            self.at += 1;
+            self.sides.pass();
         }
         Ok(found)
-    }
-
-    fn peek(&mut self) -> Result<Option<Side>, StoreError> {
-        if self.at == self.buffer.len() {
-            let mut room = Vec::new();
-            let block = self.sides.block(self.next, 1024, &mut room)?;
-            self.next += block.len() as u64;
-            self.buffer.clear();
-            self.buffer.extend_from_slice(block);
-            self.at = 0;
-        }
-        Ok(self.buffer.get(self.at).copied())
     }
 }

@@ -4,6 +4,8 @@
 //! Invariant:  fans are joined over edges with any number of triangles. At a vertex with more than
 //!             [`MOST_WEDGES`] triangles all boundary edges follow each other.
 
+use crate::store::Parts;
+
 /// The number of a side that is no boundary edge.
 pub(crate) const NO_RIM: u32 = u32::MAX;
 /// Wedges of one vertex that are told apart by fans.
@@ -23,10 +25,10 @@ pub(crate) fn pairs(wedges: &[Wedge]) -> Vec<[u32; 2]> {
     neighbours.sort_unstable();
     neighbours.dedup();
     let place = |id: u32| neighbours.binary_search(&id).expect("all neighbours are listed");
-    let mut parents: Vec<usize> = (0..neighbours.len()).collect();
+    let mut parts = Parts::new(neighbours.len());
     for wedge in wedges {
-        let [a, b] = wedge.neighbours.map(|id| root(&mut parents, place(id)));
-        parents[a.max(b)] = a.min(b);
+        let [a, b] = wedge.neighbours.map(place);
+        parts.unite(a, b);
     }
     let mut first = vec![NO_RIM; neighbours.len()];
     let mut found = Vec::new();
@@ -35,7 +37,7 @@ pub(crate) fn pairs(wedges: &[Wedge]) -> Vec<[u32; 2]> {
             if rim == NO_RIM {
                 continue;
             }
-            let fan = root(&mut parents, place(id));
+            let fan = parts.first(place(id));
             match first[fan] {
                 NO_RIM => first[fan] = rim,
                 other => found.push([other, rim]),
@@ -43,12 +45,4 @@ pub(crate) fn pairs(wedges: &[Wedge]) -> Vec<[u32; 2]> {
         }
     }
     found
-}
-
-fn root(parents: &mut [usize], mut at: usize) -> usize {
-    while parents[at] != at {
-        parents[at] = parents[parents[at]];
-        at = parents[at];
-    }
-    at
 }

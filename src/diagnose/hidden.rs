@@ -3,10 +3,10 @@
 use crate::defect::{Defect, DefectKind, HiddenShell};
 use crate::diagnose::Means;
 use crate::diagnose::finding::{Finding, Measure, SizedPlaces};
-use crate::diagnose::model::{BLOCK, Model};
+use crate::diagnose::model::Model;
 use crate::diagnose::shells::Shells;
 use crate::diagnose::sight::Sight;
-use crate::store::StoreError;
+use crate::store::{SequencePeek, StoreError};
 
 /// Finds all of them, and notes which are seen. Transparent triangles stop no view.
 pub(crate) fn find(
@@ -20,16 +20,10 @@ pub(crate) fn find(
         (0..shells.len()).try_for_each(|shell| shells.see(shell))?;
         return Ok(Finding::none(DefectKind::HiddenShell));
     };
-    let mut panes = Vec::new();
-    let mut panes_from = 0;
-    let mut buffer = Vec::new();
+    let mut panes = SequencePeek::new(&model.transparent);
     model.each(means, |triangle| {
-        if triangle.number >= panes_from + panes.len() as u64 {
-            panes_from = triangle.number;
-            panes.clear();
-            panes.extend_from_slice(model.transparent.block(panes_from, BLOCK, &mut buffer)?);
-        }
-        let is_pane = panes[(triangle.number - panes_from) as usize] == 1;
+        let is_pane = panes.peek()?.is_some_and(|(_, pane)| pane == 1);
+        panes.pass();
         if triangle.is_whole() && !is_pane {
             sight.fill(triangle.corners);
         }

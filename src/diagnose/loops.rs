@@ -16,7 +16,7 @@ use crate::diagnose::edges::{Side, SideReader};
 use crate::diagnose::fans::{MOST_WEDGES, NO_RIM, Wedge, pairs};
 use crate::diagnose::finding::{Finding, Measure, SizedPlaces};
 use crate::diagnose::model::{BLOCK, Model};
-use crate::store::{Labels, Record, Sequence, Sorter, StoreError, Table, Unite};
+use crate::store::{Labels, Record, Sequence, SequencePeek, Sorter, StoreError, Table, Unite};
 
 /// What is open.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -184,7 +184,7 @@ fn join(model: &Model, rims: &Sequence<Rim>, means: &Means<'_>) -> Result<Labels
         Ok(())
     })?;
     let mut wedges = Sorter::new(scratch, share_bytes / 4);
-    let mut reader = RimReader { rims, next: 0, block: Vec::new(), at: 0 };
+    let mut reader = RimReader { rims: SequencePeek::new(rims) };
     let mut visit = |vertices: [u32; 3], number: u64| {
         let own = reader.of(number)?;
         for corner in 0..3 {
@@ -244,11 +244,7 @@ enum Crowd {
 
 /// Reads boundary edges beside the triangles that they belong to.
 struct RimReader<'r> {
-    rims: &'r Sequence<Rim>,
-    /// The number of the first rim behind the block.
-    next: u64,
-    block: Vec<Rim>,
-    at: usize,
+    rims: SequencePeek<'r, Rim>,
 }
 
 impl RimReader<'_> {
@@ -256,22 +252,12 @@ impl RimReader<'_> {
     /// order.
     fn of(&mut self, triangle: u64) -> Result<[u32; 3], StoreError> {
         let mut found = [NO_RIM; 3];
-        loop {
-            if self.at == self.block.len() {
-                let mut room = Vec::new();
-                let block = self.rims.block(self.next, BLOCK, &mut room)?;
-                self.next += block.len() as u64;
-                self.block.clear();
-                self.block.extend_from_slice(block);
-                self.at = 0;
-            }
-            let Some(rim) = self.block.get(self.at) else { return Ok(found) };
-            if u64::from(rim.side) >= triangle * 3 + 3 {
-                return Ok(found);
-            }
-            let first = self.next - self.block.len() as u64;
-            found[rim.side as usize % 3] = (first + self.at as u64) as u32;
-            self.at += 1;
+        while let Some((number, rim)) = self.rims.peek()?
+            && u64::from(rim.side) < triangle * 3 + 3
+        {
+            found[rim.side as usize % 3] = number as u32;
+            self.rims.pass();
         }
+        Ok(found)
     }
 }

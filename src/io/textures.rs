@@ -13,6 +13,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::io::beside::{file_inside, folder_of};
 use crate::io::error::{IoError, Place};
+use crate::io::image_kind::ImageKind;
 use crate::io::input::Input;
 use crate::io::palette::Palette;
 use crate::io::{Format, WriteOptions};
@@ -26,65 +27,6 @@ const HEAD_BYTES: usize = 12;
 const NONE: u32 = u32::MAX;
 /// The most images that are named one by one where they are lost.
 const MOST_NAMED: usize = 16;
-
-/// How an image is encoded, by its first bytes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum ImageKind {
-    Png,
-    Jpeg,
-    WebP,
-    Ktx2,
-    Avif,
-    Other,
-}
-
-impl ImageKind {
-    const ALL: [Self; 6] = [Self::Png, Self::Jpeg, Self::WebP, Self::Ktx2, Self::Avif, Self::Other];
-
-    fn of(head: &[u8]) -> Self {
-        let is = |at: usize, mark: &[u8]| head.get(at..).is_some_and(|h| h.starts_with(mark));
-        match () {
-            () if is(0, b"\x89PNG") => Self::Png,
-            () if is(0, b"\xff\xd8\xff") => Self::Jpeg,
-            () if is(0, b"RIFF") && is(8, b"WEBP") => Self::WebP,
-            () if is(0, b"\xabKTX 20\xbb") => Self::Ktx2,
-            () if is(4, b"ftypavi") => Self::Avif,
-            () => Self::Other,
-        }
-    }
-
-    pub(crate) fn media_type(self) -> &'static str {
-        match self {
-            Self::Png => "image/png",
-            Self::Jpeg => "image/jpeg",
-            Self::WebP => "image/webp",
-            Self::Ktx2 => "image/ktx2",
-            Self::Avif => "image/avif",
-            Self::Other => "application/octet-stream",
-        }
-    }
-
-    /// How names of files end.
-    pub(crate) fn ending(self) -> &'static str {
-        match self {
-            Self::Png => "png",
-            Self::Jpeg => "jpg",
-            Self::WebP => "webp",
-            Self::Ktx2 => "ktx2",
-            Self::Avif => "avif",
-            Self::Other => "image",
-        }
-    }
-
-    /// Whether an output of this format can show it.
-    fn is_held_by(self, format: Format) -> bool {
-        match format {
-            Format::ThreeMf => matches!(self, Self::Png | Self::Jpeg),
-            Format::Glb => self != Self::Other,
-            _ => true,
-        }
-    }
-}
 
 /// An image that a material of the output shows.
 #[derive(Clone, Debug)]
@@ -288,86 +230,15 @@ fn way(folder: &Path, file: &Path) -> Option<String> {
 }
 
 /// The name of an image that is put beside an output.
-fn name_beside(output: &Path, number: u32, kind: ImageKind) -> String {
+pub(crate) fn name_beside(output: &Path, number: u32, kind: ImageKind) -> String {
     let stem = output.file_stem().unwrap_or_default().to_string_lossy();
     let stem: String = stem.chars().map(|c| if c.is_control() { '_' } else { c }).collect();
     let dot = if stem.starts_with(['-', '#']) { "./" } else { "" };
     format!("{dot}{stem}.texture-{number}.{}", kind.ending())
 }
 
-/// An image that an output names and does not hold.
-pub struct ImageBeside<'t> {
-    textures: &'t Textures,
-    image: Shown,
-    /// Its file, beside the output.
-    pub path: PathBuf,
-}
-
-impl ImageBeside<'_> {
-    /// Whether the file at its path, if there is one, has the very bytes of it.
-    ///
-    /// # Errors
-    /// The scratch folder fails.
-    pub fn is_there(&self) -> Result<bool, IoError> {
-        let Ok(mut input) = Input::open(&self.path, 0) else { return Ok(false) };
-        let mut is_same = input.size_bytes() == self.image.bytes;
-        self.textures.copy(&self.image, |block| {
-            let mut rest = block;
-            while is_same && !rest.is_empty() {
-                if input.available().is_empty() && !input.fill().unwrap_or(false) {
-                    is_same = false;
-                    break;
-                }
-                let count = rest.len().min(input.available().len());
-                is_same = input.take(count) == &rest[..count];
-                rest = &rest[count..];
-            }
-            Ok(())
-        })?;
-        Ok(is_same)
-    }
-
-    /// Writes it to `path`, and hands it to the disk.
-    ///
-    /// # Errors
-    /// The file cannot be written.
-    pub fn write(&self, path: &Path, scratch: &Scratch) -> Result<(), IoError> {
-        let mut output = crate::io::output::Output::create(path, scratch)?;
-        self.textures.copy(&self.image, |block| output.write(block))?;
-        output.finish().map(drop)
-    }
-}
-
-/// Shows every image that has to lie beside an output of this format, since it does not hold them
-/// and the input has them inside.
-///
-/// # Errors
-/// The palette cannot be read, as `of_io` says it, or what `visit` says.
-pub fn images_beside<E>(
-    format: Format,
-    options: &WriteOptions,
-    scratch: &Scratch,
-    of_io: impl Fn(IoError) -> E,
-    mut visit: impl FnMut(&ImageBeside) -> Result<(), E>,
-) -> Result<(), E> {
-    let (true, Some(palette)) = (refers(format, options.attributes), &options.palette) else {
-        return Ok(());
-    };
-    let found = Textures::find(palette, format, scratch, |_| Ok(true));
-    let mut textures = found.map_err(&of_io)?;
-    for number in 0..textures.count() as u32 {
-        let image = textures.image(number).map_err(&of_io)?;
-        if matches!(image.texture, Texture::Inside(_)) {
-            let name = name_beside(&options.output, number, image.kind);
-            let path = options.output.with_file_name(name.trim_start_matches("./"));
-            visit(&ImageBeside { textures: &textures, image, path })?;
-        }
-    }
-    Ok(())
-}
-
 /// Whether an output names images that lie elsewhere.
-fn refers(format: Format, attributes: Attributes) -> bool {
+pub(crate) fn refers(format: Format, attributes: Attributes) -> bool {
     attributes.uvs && matches!(format, Format::Obj | Format::Ply)
 }
 

@@ -54,6 +54,14 @@ struct Batch {
     normals: Vec<[f32; 3]>,
 }
 
+/// Room for what is around one vertex.
+#[derive(Default)]
+struct Room {
+    answers: Vec<Answer>,
+    looks: Vec<(u32, u32)>,
+    parts: Vec<usize>,
+}
+
 /// Paints one vertex after another.
 pub struct Painter<'p, S: ?Sized> {
     options: &'p PaintOptions,
@@ -64,6 +72,7 @@ pub struct Painter<'p, S: ?Sized> {
     fans: Fans,
     answers: Sorter<Answer>,
     batch: Batch,
+    room: Room,
     /// Handed over so far, the batch included.
     vertices: u64,
     uvs: u64,
@@ -86,6 +95,7 @@ impl<'p, S: MeshSink + ?Sized> Painter<'p, S> {
             fans: Fans::new(options.crease_deg, options.slack),
             answers: Sorter::new(resources.scratch, resources.share_bytes / 3),
             batch: Batch::default(),
+            room: Room::default(),
             vertices: 0,
             uvs: 0,
             normals: 0,
@@ -124,17 +134,17 @@ impl<'p, S: MeshSink + ?Sized> Painter<'p, S> {
             let nearest = values.iter().min_by_key(|value| value.nearness());
             self.add_vertex(position, nearest.map_or(WHITE, |value| value.colour))?;
         }
-        let mut answers: Vec<Answer> = around
-            .iter()
-            .map(|corner| Answer {
-                triangle: corner.triangle,
-                corner: corner.corner,
-                vertex: (self.vertices.max(1) - 1) as u32,
-                ..Answer::default()
-            })
-            .collect();
+        let mut room = std::mem::take(&mut self.room);
+        let Room { answers, looks, parts } = &mut room;
+        answers.clear();
+        answers.extend(around.iter().map(|corner| Answer {
+            triangle: corner.triangle,
+            corner: corner.corner,
+            vertex: (self.vertices.max(1) - 1) as u32,
+            ..Answer::default()
+        }));
         // Looks and parts of the fan, in the order of the corners that have them first.
-        let mut looks: Vec<(u32, u32)> = Vec::new();
+        looks.clear();
         for (answer, corner) in answers.iter_mut().zip(around) {
             let value = values.iter().find(|value| value.look == corner.look);
             answer.uv = value.map_or([0.0; 2], |value| value.uv);
@@ -152,8 +162,12 @@ impl<'p, S: MeshSink + ?Sized> Painter<'p, S> {
                 }
             };
         }
-        let parts: Vec<usize> =
-            if wanted.normals { self.fans.divide(around).to_vec() } else { vec![0; around.len()] };
+        parts.clear();
+        if wanted.normals {
+            parts.extend_from_slice(self.fans.divide(around));
+        } else {
+            parts.resize(around.len(), 0);
+        }
         if wanted.normals {
             for at in 0..around.len() {
                 if parts[at] < at {
@@ -169,9 +183,11 @@ impl<'p, S: MeshSink + ?Sized> Painter<'p, S> {
             }
         }
         if is_split {
-            self.split(position, (around, &parts), &mut answers, values)?;
+            self.split(position, (around, parts), answers, values)?;
         }
-        answers.into_iter().try_for_each(|answer| self.answers.push(answer))
+        answers.iter().try_for_each(|answer| self.answers.push(*answer))?;
+        self.room = room;
+        Ok(())
     }
 
     /// Adds the vertex once for each look and part of its corners.

@@ -5,6 +5,7 @@
 use glam::DVec3;
 
 use crate::paint::drawing::DrawnCorner;
+use crate::store::Parts;
 
 /// Facets of a round surface whose vertices lie so far off it that their heights are this many times
 /// as much may meet at an angle of 1 radian: half by their vertices, half by its curvature.
@@ -25,8 +26,9 @@ pub struct Fans {
     cosine: f64,
     crease: f64,
     slack: f64,
+    parts: Parts,
     /// Each corner's part, by the first corner in it.
-    parts: Vec<usize>,
+    firsts: Vec<usize>,
     /// Edges at the vertex: the other end, the corner, whether the edge leads there.
     edges: Vec<(u32, usize, bool)>,
     /// Neighbours of which one has no normal at least.
@@ -46,7 +48,8 @@ impl Fans {
             cosine: crease.cos(),
             crease,
             slack,
-            parts: Vec::new(),
+            parts: Parts::default(),
+            firsts: Vec::new(),
             edges: Vec::new(),
             narrow: Vec::new(),
             counts: Vec::new(),
@@ -56,8 +59,7 @@ impl Fans {
 
     /// Of each corner around one vertex the first corner of its part.
     pub fn divide(&mut self, corners: &[DrawnCorner]) -> &[usize] {
-        self.parts.clear();
-        self.parts.extend(0..corners.len());
+        self.parts.reset(corners.len());
         self.find_normals(corners);
         self.edges.clear();
         for (at, corner) in corners.iter().enumerate() {
@@ -77,14 +79,13 @@ impl Fans {
             } else if a.dot(b) >= self.cosine
                 || a.dot(b) >= self.bent_cosine(corners[one].height.min(corners[other].height))
             {
-                unite(&mut self.parts, one, other);
+                self.parts.unite(one, other);
             }
         }
         self.take_in_narrow();
-        for at in 0..self.parts.len() {
-            self.parts[at] = self.parts[self.parts[at]];
-        }
-        &self.parts
+        self.firsts.clear();
+        self.firsts.extend_from_slice(self.parts.firsts());
+        &self.firsts
     }
 
     /// Which triangles are wide enough that their normals count: the widest at least.
@@ -103,7 +104,7 @@ impl Fans {
     /// The mean of the normals of a part, weighted by their angles; that of the first where they
     /// cancel.
     pub fn normal(&self, corners: &[DrawnCorner], part: usize) -> [f32; 3] {
-        let own = || (0..corners.len()).filter(|at| self.parts[*at] == part);
+        let own = || (0..corners.len()).filter(|at| self.firsts[*at] == part);
         let counting = || own().filter(|at| self.counts[*at]);
         let first =
             counting().next().or(own().next()).map_or(DVec3::Z, |at| normal_of(&corners[at]));
@@ -127,7 +128,7 @@ impl Fans {
             let (parts, is_in) = (&mut self.parts, &mut self.is_in);
             self.narrow.retain(|&[one, other]| {
                 if is_in[one] != is_in[other] {
-                    unite(parts, one, other);
+                    parts.unite(one, other);
                     (is_in[one], is_in[other]) = (true, true);
                 }
                 !(is_in[one] && is_in[other])
@@ -138,21 +139,6 @@ impl Fans {
         }
         self.narrow.clear();
     }
-}
-
-/// Joins the parts of two corners.
-fn unite(parts: &mut [usize], one: usize, other: usize) {
-    let [a, b] = [one, other].map(|at| root(parts, at));
-    parts[a.max(b)] = a.min(b);
-}
-
-/// The first of a part, with the way there made shorter.
-fn root(parts: &mut [usize], mut at: usize) -> usize {
-    while parts[at] != at {
-        parts[at] = parts[parts[at]];
-        at = parts[at];
-    }
-    at
 }
 
 fn normal_of(corner: &DrawnCorner) -> DVec3 {

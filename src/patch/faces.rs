@@ -8,7 +8,7 @@ use std::collections::HashMap;
 use bytemuck::{Pod, Zeroable};
 
 use crate::octree::{ArchivedHitBrick, BrickKey, EdgeBits, HitEdge, SIDE, SourcePlane, edge_index};
-use crate::store::Record;
+use crate::store::{Parts, Record};
 
 /// A face with an odd number of marks. Its normal is `axis`, its min corner is in cells of the
 /// grid; `sub` is where the rim pierces it, in 1/256 along the axes after `axis`.
@@ -164,19 +164,11 @@ fn unite_by_cell(faces: &[LocalFace]) -> Vec<usize> {
         .flat_map(|(i, face)| face.cells().map(move |cell| (cell, i)))
         .collect();
     at_cell.sort_unstable();
-    let mut parents: Vec<usize> = (0..faces.len()).collect();
-    fn root(parents: &mut [usize], mut at: usize) -> usize {
-        while parents[at] != at {
-            parents[at] = parents[parents[at]];
-            at = parents[at];
-        }
-        at
-    }
+    let mut parts = Parts::new(faces.len());
     for pair in at_cell.windows(2).filter(|pair| pair[0].0 == pair[1].0) {
-        let (a, b) = (root(&mut parents, pair[0].1), root(&mut parents, pair[1].1));
-        parents[a.max(b)] = a.min(b);
+        parts.unite(pair[0].1, pair[1].1);
     }
-    (0..faces.len()).map(|i| root(&mut parents, i)).collect()
+    parts.firsts().to_vec()
 }
 
 impl LocalFace {

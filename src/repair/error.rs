@@ -76,9 +76,9 @@ pub enum RepairError {
         /// The work folder.
         folder: PathBuf,
     },
-    /// The material library beside the output would replace a file that is not ours.
+    /// The material library or an image beside the output would replace a file that is not ours.
     #[error(
-        "{path} would be replaced by the materials of the output, and is none of brickmend's; give \
+        "{path} would be replaced by what belongs to the output, and is none of brickmend's; give \
          the output another name"
     )]
     ForeignLibrary {

@@ -6,8 +6,11 @@ use bytemuck::Pod;
 
 use crate::store::{Scratch, ScratchFile, StoreError};
 
-/// Bytes that a spool on disk keeps back before it writes.
+/// Bytes that a sequence on disk keeps back before it writes.
 const BLOCK_BYTES: usize = 64 << 10;
+
+/// Records that are read at a time.
+const PEEKED: usize = 1024;
 
 /// Records in the order in which they came.
 pub struct Sequence<R: Pod> {
@@ -19,7 +22,7 @@ pub struct Sequence<R: Pod> {
 }
 
 impl<R: Pod> Sequence<R> {
-    /// An empty spool that keeps at most `share_bytes` in memory.
+    /// An empty sequence that keeps at most `share_bytes` in memory.
     #[must_use]
     pub fn new(scratch: &Scratch, share_bytes: u64) -> Self {
         let share_bytes = usize::try_from(share_bytes).unwrap_or(usize::MAX).max(size_of::<R>());
@@ -93,7 +96,7 @@ impl<R: Pod> Sequence<R> {
 
     fn flush(&mut self) -> Result<(), StoreError> {
         if self.file.is_none() {
-            self.file = Some(self.scratch.anonymous("spool")?);
+            self.file = Some(self.scratch.anonymous("sequence")?);
         }
         let file = self.file.as_ref().expect("the file was opened above");
         let offset = self.written * size_of::<R>() as u64;
@@ -131,9 +134,7 @@ impl<R: Pod> Sequence<R> {
         let from = ((start - self.written) as usize).min(self.resident.len());
         Ok(&self.resident[from..self.resident.len().min(from + count)])
     }
-}
 
-impl<R: Pod> Sequence<R> {
     /// Shows all records in order, in blocks of at most `count`.
     ///
     /// # Errors
@@ -154,25 +155,69 @@ impl<R: Pod> Sequence<R> {
     }
 }
 
+/// Reads a sequence record by record.
+pub struct SequencePeek<'s, R: Pod> {
+    sequence: &'s Sequence<R>,
+    /// Records from number `first` on, and room for others.
+    block: Vec<R>,
+    room: Vec<R>,
+    first: u64,
+    at: usize,
+}
+
+impl<'s, R: Pod> SequencePeek<'s, R> {
+    /// All of `sequence`, from its first record.
+    #[must_use]
+    pub fn new(sequence: &'s Sequence<R>) -> Self {
+        Self { sequence, block: Vec::new(), room: Vec::new(), first: 0, at: 0 }
+    }
+
+    /// The next record with its number, `None` at the end.
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn peek(&mut self) -> Result<Option<(u64, R)>, StoreError> {
+        if self.at == self.block.len() {
+            self.first += self.block.len() as u64;
+            let next = self.sequence.block(self.first, PEEKED, &mut self.room)?;
+            self.block.clear();
+            self.block.extend_from_slice(next);
+            self.at = 0;
+        }
+        Ok(self.block.get(self.at).map(|record| (self.first + self.at as u64, *record)))
+    }
+
+    /// Passes over the record that [`SequencePeek::peek`] told.
+    pub fn pass(&mut self) {
+        self.at += 1;
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn a_spool_on_disk_reads_like_one_in_memory() {
+    fn a_sequence_on_disk_reads_like_one_in_memory() {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let scratch = Scratch::new(folder.path());
         for share_bytes in [0, 100, 4096, 1 << 20] {
-            let mut spool = Sequence::<u64>::new(&scratch, share_bytes);
-            (0..5000).for_each(|i| spool.push(i).expect("push works"));
-            assert_eq!(spool.file.is_some(), share_bytes <= 4096);
+            let mut sequence = Sequence::<u64>::new(&scratch, share_bytes);
+            (0..5000).for_each(|i| sequence.push(i).expect("push works"));
+            assert_eq!(sequence.file.is_some(), share_bytes <= 4096);
             let (mut seen, mut buffer) = (Vec::new(), Vec::new());
-            while (seen.len() as u64) < spool.len() {
-                let block = spool.block(seen.len() as u64, 37, &mut buffer).expect("read works");
+            while (seen.len() as u64) < sequence.len() {
+                let block = sequence.block(seen.len() as u64, 37, &mut buffer).expect("read works");
                 assert!(!block.is_empty() && block.len() <= 37);
                 seen.extend_from_slice(block);
             }
             assert_eq!(seen, (0..5000).collect::<Vec<_>>());
+            let mut peek = SequencePeek::new(&sequence);
+            for expected in 0..5000 {
+                assert_eq!(peek.peek().expect("read works"), Some((expected, expected)));
+                peek.pass();
+            }
+            assert_eq!(peek.peek().expect("read works"), None);
         }
     }
 }

@@ -4,7 +4,7 @@
 //!             twice. An edge is counted at its lower end, so once.
 
 use crate::defect::Smallest;
-use crate::store::{Sequence, StoreError};
+use crate::store::{Parts, Sequence, StoreError};
 
 /// Next and previous vertex of a triangle, seen from its corner at the judged vertex.
 pub(crate) type Wedge = [u32; 2];
@@ -160,22 +160,7 @@ pub(crate) fn is_one_long_cycle(wedges: &mut [Wedge]) -> bool {
 /// Counts the fans of wedges that hang together over neighbours (ascending).
 fn count_fans(wedges: &[Wedge], neighbours: &[u32]) -> u64 {
     let place = |id: u32| neighbours.binary_search(&id).expect("both ends of a wedge are listed");
-    let mut parents: Vec<usize> = (0..neighbours.len()).collect();
-    let mut fans = neighbours.len() as u64;
-    for wedge in wedges {
-        let [a, b] = wedge.map(|id| root(&mut parents, place(id)));
-        if a != b {
-            parents[a.max(b)] = a.min(b);
-            fans -= 1;
-        }
-    }
-    fans
-}
-
-fn root(parents: &mut [usize], mut at: usize) -> usize {
-    while parents[at] != at {
-        parents[at] = parents[parents[at]];
-        at = parents[at];
-    }
-    at
+    let mut parts = Parts::new(neighbours.len());
+    let joined = wedges.iter().filter(|[a, b]| parts.unite(place(*a), place(*b))).count();
+    (neighbours.len() - joined) as u64
 }

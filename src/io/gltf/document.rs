@@ -7,9 +7,10 @@ use serde::Serialize;
 
 use crate::io::error::IoError;
 use crate::io::gltf::values::ValuesLayout;
+use crate::io::image_kind::ImageKind;
 use crate::io::output::Output;
 use crate::io::palette::Palette;
-use crate::io::textures::{ImageKind, Shown, Textures};
+use crate::io::textures::{Shown, Textures};
 use crate::mesh::{Material, Surface};
 use crate::store::Table;
 

@@ -10,11 +10,12 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::io::Format;
 use crate::io::error::IoError;
+use crate::io::image_kind::ImageKind;
 use crate::io::numbers::push_single;
 use crate::io::output::Aside;
 use crate::io::palette::Palette;
 use crate::io::polygon::WHITE;
-use crate::io::textures::{ImageKind, Textures};
+use crate::io::textures::Textures;
 use crate::io::threemf::bases::Bases;
 use crate::io::threemf::package::relationships;
 use crate::io::threemf::properties::colour_name;
