@@ -2,7 +2,7 @@
 
 use std::ffi::OsString;
 use std::fs::File;
-use std::io::{BufRead, BufReader, Read};
+use std::io::{ErrorKind, Read};
 use std::os::unix::fs::MetadataExt;
 use std::path::Path;
 
@@ -13,8 +13,8 @@ use crate::repair::{Blame, Limits, MemoryPlan, RepairError};
 use crate::store::{Scratch, StoreError, sync_folder};
 use crate::verify::{Outward, ProofOptions, VerifyError, Vertices, prove};
 
-/// Files are named at the beginning, or not at all.
-const MOST_LOOKED_AT_BYTES: u64 = 1 << 20;
+/// What is read at a time.
+const BLOCK_BYTES: usize = 64 << 10;
 
 /// Copies `input` to `output`, whole or not at all, if it is sound and of the format that is asked
 /// for; whether it was.
@@ -39,24 +39,39 @@ pub fn copy_if_sound(
         return Ok(false);
     }
     let before = Stamp::at(input);
-    if names_others(input, format) || !is_sound(input, limits, monitor)? {
+    if !is_sound(input, limits, monitor)? || names_others(input, format)? {
         return Ok(false);
     }
     copy((input, before), output, limits)?;
     Ok(true)
 }
 
-/// Whether the model names files beside it: alone, its copy would be less than it.
-fn names_others(input: &Path, format: Format) -> bool {
+/// Whether the model names files beside it: alone, its copy would be less than it. Where the word for
+/// that stands in a remark, the model is repaired for nothing.
+fn names_others(input: &Path, format: Format) -> Result<bool, StoreError> {
     let word: &[u8] = match format {
         Format::Obj => b"mtllib",
-        Format::Ply => b"comment TextureFile",
-        Format::Stl | Format::Off | Format::ThreeMf | Format::Glb => return false,
+        Format::Ply => b"TextureFile",
+        Format::Stl | Format::Off | Format::ThreeMf | Format::Glb => return Ok(false),
     };
-    // What cannot be read is told by what comes next.
-    let Ok(file) = File::open(input) else { return false };
-    let mut lines = BufReader::new(file.take(MOST_LOOKED_AT_BYTES)).split(b'\n');
-    lines.any(|line| line.is_ok_and(|line| line.trim_ascii_start().starts_with(word)))
+    let mut file = File::open(input).map_err(|e| StoreError::io("open", input, e))?;
+    let mut block = vec![0; BLOCK_BYTES];
+    // The end of the block before, in which the word may begin.
+    let mut kept = 0;
+    loop {
+        let count = match file.read(&mut block[kept..]) {
+            Ok(0) => return Ok(false),
+            Ok(count) => count,
+            Err(error) if error.kind() == ErrorKind::Interrupted => continue,
+            Err(error) => return Err(StoreError::io("read", input, error)),
+        };
+        let end = kept + count;
+        if block[..end].windows(word.len()).any(|part| part == word) {
+            return Ok(true);
+        }
+        kept = end.min(word.len() - 1);
+        block.copy_within(end - kept..end, 0);
+    }
 }
 
 fn is_sound(input: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<bool, RepairError> {
@@ -130,4 +145,28 @@ fn copy_to(input: &Path, part: &Path) -> Result<(), StoreError> {
     let mut to = File::create(part).map_err(failed("create", part))?;
     std::io::copy(&mut from, &mut to).map_err(failed("copy to", part))?;
     to.sync_all().map_err(failed("synchronise", part))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn words_are_found_wherever_they_stand() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let path = folder.path().join("a.obj");
+        let names = |content: &[u8], format| {
+            std::fs::write(&path, content).expect("writable");
+            names_others(&path, format).expect("readable")
+        };
+        for before in [0, 7, BLOCK_BYTES - 9, BLOCK_BYTES - 3, 3 * BLOCK_BYTES] {
+            let mut content = vec![b'#'; before];
+            assert!(!names(&content, Format::Obj));
+            content.extend(b"\nmtllib a.mtl\n");
+            assert!(names(&content, Format::Obj), "{before}");
+            assert!(!names(&content, Format::Ply));
+        }
+        assert!(names(b"ply\ncomment TextureFile a.png\n", Format::Ply));
+        assert!(!names(b"mtllib", Format::Stl));
+    }
 }
