@@ -7,11 +7,12 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use brickmend::catalogue::{
-    BatchOptions, BatchReport, CatalogueError, Cause, Fleet, Retry, RunEnding, Selection, Summary,
-    Wanted, run_batch,
+    BatchOptions, BatchReport, CatalogueError, Cause, Fleet, Pages, Retry, RunEnding, Selection,
+    Summary, Wanted, run_batch,
 };
 use brickmend::io::Format;
 use brickmend::repair::Blame;
+use brickmend::report::report_folder;
 use brickmend::store::StoreError;
 use clap::Args;
 
@@ -19,6 +20,7 @@ use crate::cli::arguments::{FormatName, ResourceArguments, ResultArguments, pars
 use crate::cli::exit_code::Exit;
 use crate::cli::fleet::Terminal;
 use crate::cli::progress::{Chatter, on_one_line};
+use crate::cli::report;
 use crate::cli::signals::Stop;
 
 const EXIT_STATUS: &str = "\
@@ -88,6 +90,13 @@ pub struct BatchArguments {
     /// Stop after this time, such as 4h; the same command goes on.
     #[arg(long = "for", value_name = "TIME", value_parser = parse_time, help_heading = "Resources")]
     time: Option<u64>,
+    /// What is drawn of each model that is done: small pictures before and after, a page.
+    #[arg(long, value_enum, value_name = "WHAT", default_value_t = PagesName::All,
+          help_heading = "Report")]
+    pages: PagesName,
+    /// Draw nothing: as --pages none.
+    #[arg(long, conflicts_with = "pages", help_heading = "Report")]
+    no_pages: bool,
     /// Tell what there is to do, and stop.
     #[arg(long, help_heading = "Report")]
     plan: bool,
@@ -107,6 +116,27 @@ enum RetryName {
     All,
 }
 
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum PagesName {
+    /// Pictures and a page of each model.
+    All,
+    /// Pictures.
+    Thumbnails,
+    /// Nothing; the page of the catalogue is written all the same.
+    None,
+}
+
+impl From<PagesName> for Pages {
+    fn from(name: PagesName) -> Self {
+        match name {
+            PagesName::All => Self::All,
+            PagesName::Thumbnails => Self::Thumbnails,
+            PagesName::None => Self::None,
+        }
+    }
+}
+
 /// Runs the command.
 pub fn run(arguments: &BatchArguments, chatter: &Chatter) -> ExitCode {
     let stop = match Stop::listen() {
@@ -120,9 +150,10 @@ pub fn run(arguments: &BatchArguments, chatter: &Chatter) -> ExitCode {
     let report = batch(arguments, &terminal);
     terminal.clear();
     match report {
-        Ok(report) => {
-            tell(&report, arguments.json, chatter);
-            exit_of(&report, &stop).into()
+        Ok(batch) => {
+            tell(&batch, arguments.json, chatter);
+            let page = write_page(&batch, arguments, chatter);
+            page.unwrap_or_else(|| exit_of(&batch, &stop)).into()
         }
         Err(error) => {
             chatter.error(&error);
@@ -130,6 +161,21 @@ pub fn run(arguments: &BatchArguments, chatter: &Chatter) -> ExitCode {
                 Blame::Interrupted => stop.exit().into(),
                 blame => Exit::from(blame).into(),
             }
+        }
+    }
+}
+
+/// Writes the page of the catalogue; how the process ends where that fails.
+fn write_page(batch: &BatchReport, arguments: &BatchArguments, chatter: &Chatter) -> Option<Exit> {
+    batch.ending?;
+    match report::write(&arguments.output, None) {
+        Ok(path) => {
+            chatter.say(&format!("report: {}", on_one_line(&path.display().to_string())));
+            None
+        }
+        Err(error) => {
+            chatter.error(&error);
+            Some(Exit::from(error.blame()))
         }
     }
 }
@@ -158,6 +204,8 @@ fn batch(arguments: &BatchArguments, fleet: &Terminal) -> Result<BatchReport, Ca
         work_dir: limits.work_dir,
         model_timeout_ms: arguments.model_timeout,
         max_failures: arguments.max_failures,
+        pages: if arguments.no_pages { Pages::None } else { arguments.pages.into() },
+        report: report_folder(&arguments.output),
         stop_at_ms: arguments.time.map(|time| fleet.now_ms().saturating_add(time)),
         retry: retry(&arguments.retry),
         rehash: arguments.rehash,

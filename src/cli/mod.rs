@@ -11,6 +11,7 @@ mod last_words;
 mod memory;
 mod progress;
 mod repair;
+mod report;
 mod signals;
 mod stage_clock;
 mod status;
@@ -45,6 +46,8 @@ enum Command {
     Batch(batch::BatchArguments),
     /// Tell where a folder of results stands.
     Status(status::StatusArguments),
+    /// Write the page of a folder of results anew.
+    Report(report::ReportArguments),
     /// Work for a batch.
     #[command(hide = true)]
     Worker(worker::WorkerArguments),
@@ -63,6 +66,7 @@ pub fn run() -> std::process::ExitCode {
         Command::Inspect(arguments) => inspect::run(&arguments, &chatter),
         Command::Batch(arguments) => batch::run(&arguments, &chatter),
         Command::Status(arguments) => status::run(&arguments, &chatter),
+        Command::Report(arguments) => report::run(&arguments, &chatter),
         Command::Worker(arguments) => worker::run(&arguments, &chatter),
         Command::Estimate(arguments) => estimate::run(&arguments, &chatter),
     }
