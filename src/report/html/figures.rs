@@ -48,8 +48,8 @@ pub(crate) fn decimal(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {
         "0".to_owned()
-    } else if (1e-3..1e6).contains(&size) {
-        let digits = (4 - size.log10().floor() as i32).clamp(0, 7) as usize;
+    } else if (1e-4..1e6).contains(&size) {
+        let digits = (4 - size.log10().floor() as i32).clamp(0, 8) as usize;
         let text = format!("{value:.digits$}");
         let text = if text.contains('.') {
             text.trim_end_matches('0').trim_end_matches('.')
@@ -58,7 +58,7 @@ pub(crate) fn decimal(value: f64) -> String {
         };
         text.to_owned()
     } else {
-        format!("{value:.4e}")
+        format!("{value:.3e}")
     }
 }
 
@@ -104,7 +104,7 @@ mod tests {
         assert_eq!(seconds(3700.0), "61:40\u{202f}min");
         assert_eq!(decimal(0.125), "0.125");
         assert_eq!(decimal(1234.0), "1234");
-        assert_eq!(decimal(1e-9), "1.0000e-9");
+        assert_eq!(decimal(1e-9), "1.000e-9");
         assert_eq!(date(0), "1970-01-01 00:00:00 UTC");
         assert_eq!(date(u64::MAX), "at no date");
     }

@@ -79,7 +79,8 @@ pub(crate) fn write_meshes(html: &mut Markup, meshes: &[LightMesh; 2]) -> io::Re
         html.raw("{")?;
         for (mesh, name) in meshes.iter().zip(["before", "after"]) {
             let comma = if name == "before" { "" } else { "," };
-            html.raw(&format!("{comma}\"{name}\":{{\"vertices\":\""))?;
+            let is_whole = mesh.triangles.len() as u64 == mesh.of_triangles;
+            html.raw(&format!("{comma}\"{name}\":{{\"whole\":{is_whole},\"vertices\":\""))?;
             write_numbers(html, &mesh.vertices)?;
             html.raw("\",\"triangles\":\"")?;
             write_numbers(html, &mesh.triangles)?;

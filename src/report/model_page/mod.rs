@@ -69,7 +69,7 @@ impl PageOptions {
     /// For thousands of pages.
     #[must_use]
     pub const fn small(share_bytes: u64) -> Self {
-        Self { picture_px: 512, mesh_triangles: 4_000, share_bytes }
+        Self { picture_px: 512, mesh_triangles: 12_000, share_bytes }
     }
 }
 

@@ -57,15 +57,15 @@
     void main() {
       vec3 at = turn * place;
       seen = turn * normal;
-      gl_Position = vec4(at.xy * scale, -at.z * 0.28, 1.0);
+      gl_Position = vec4(at.xy * scale, -at.z * 0.5, 1.0);
     }`));
   gl.attachShader(program, compile(gl.FRAGMENT_SHADER, `
     precision mediump float;
-    uniform vec3 colour;
+    uniform vec3 colour, back;
     varying vec3 seen;
     void main() {
       vec3 n = normalize(gl_FrontFacing ? seen : -seen);
-      vec3 base = gl_FrontFacing ? colour : vec3(0.85, 0.20, 0.16);
+      vec3 base = gl_FrontFacing ? colour : back;
       float light = 0.10 + 0.75 * max(dot(n, vec3(-0.45, 0.75, 0.49)), 0.0)
         + 0.28 * max(dot(n, vec3(0.70, -0.10, 0.71)), 0.0);
       gl_FragColor = vec4(pow(base * min(light, 1.0), vec3(1.0 / 2.2)), 1.0);
@@ -73,7 +73,7 @@
   gl.linkProgram(program);
   gl.useProgram(program);
   const uniform = (name) => gl.getUniformLocation(program, name);
-  const [turn, scale, colour] = ["turn", "scale", "colour"].map(uniform);
+  const [turn, scale, colour, back] = ["turn", "scale", "colour", "back"].map(uniform);
 
   const meshes = JSON.parse(data.textContent);
   const sides = {};
@@ -82,9 +82,15 @@
     const buffer = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STATIC_DRAW);
-    sides[name] = { buffer, corners: corners.length / 6 };
+    sides[name] = { buffer, all: corners, corners: corners.length / 6 };
   }
   let side = "after";
+  // Whatever way it is turned, all of the result is seen.
+  let radius = 0;
+  for (let i = 0; i < sides.after.all.length; i += 6) {
+    radius = Math.max(radius, Math.hypot(...sides.after.all.subarray(i, i + 3)));
+  }
+  radius = radius || 1;
 
   const draw = () => {
     const pixels = Math.max(1, Math.round(canvas.clientWidth * (window.devicePixelRatio || 1)));
@@ -97,8 +103,11 @@
     const [cp, sp] = [Math.cos(view.pitch), Math.sin(view.pitch)];
     // Columns: where x, y and z of the model go.
     gl.uniformMatrix3fv(turn, false, [cy, -sp * sy, cp * sy, 0, cp, sp, -sy, -sp * cy, cp * cy]);
-    gl.uniform1f(scale, 0.78 * view.zoom);
-    gl.uniform3fv(colour, side === "before" ? [0.58, 0.64, 0.72] : [0.66, 0.66, 0.66]);
+    gl.uniform1f(scale, (0.96 * view.zoom) / radius);
+    const front = side === "before" ? [0.58, 0.64, 0.72] : [0.66, 0.66, 0.66];
+    gl.uniform3fv(colour, front);
+    // A mesh that was made lighter has faces turned over that the model has not.
+    gl.uniform3fv(back, meshes[side].whole ? [0.85, 0.20, 0.16] : front);
     gl.bindBuffer(gl.ARRAY_BUFFER, sides[side].buffer);
     for (const [name, offset] of [["place", 0], ["normal", 12]]) {
       const slot = gl.getAttribLocation(program, name);
