@@ -1,16 +1,15 @@
 //! A folder of models from outside: what is done, what is done again, and what a kill costs.
 
-use std::ffi::OsStr;
-use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
+use brickmend::mesh::shapes::cuboid;
 use rustix::process::{Pid, Signal, kill_process};
 
 #[path = "support/library.rs"]
 mod library;
 
-use library::{Library, SOUND, children_of, files_in, kill, slow_library, start_slowly};
+use library::{Library, SOUND, children_of, files_in, kill, obj_of, slow_library, start_slowly};
 
 fn count(summary: &serde_json::Value, state: &str) -> u64 {
     let states = summary["states"].as_array().expect("a list");

@@ -246,6 +246,30 @@ fn the_page_of_one_repair_holds_all_that_it_shows() {
 }
 
 #[test]
+fn a_long_table_ends_early_as_text_and_is_whole_as_data() {
+    let library = Library::new();
+    library.batch(&["--no-pages"]);
+    let journal = library.results().join(".brickmend/journal.sqlite");
+    let more = "WITH RECURSIVE number (i) AS (VALUES (1) UNION ALL SELECT i + 1 FROM number WHERE i < 400)
+        INSERT INTO model (path, name, output, format, run_id, state, input_bytes, input_mtime_ns,
+                           input_ctime_ns, input_inode, settings_digest)
+        SELECT CAST('m' || i AS BLOB), 'm' || i, CAST('m' || i AS BLOB), 'ply', 1, 'pending', i, 0, 0, 0,
+               x'00' FROM number";
+    let connection = rusqlite::Connection::open(journal).expect("a journal");
+    connection.execute(more, ()).expect("it may be written");
+    drop(connection);
+    let mut command = Command::new(env!("CARGO_BIN_EXE_brickmend"));
+    assert_eq!(code_of(command.arg("report").arg(library.results())), 0);
+    let page = Page::read(&library.index());
+    assert_eq!(page.card("Models"), "402");
+    assert_eq!(page.data("models-data")["models"].as_array().map(Vec::len), Some(402));
+    let rows = page.all("td").filter(|cell| cell.attribute("data-name") == Some("Size")).count();
+    assert_eq!(rows, 300);
+    let said = page.all("p").any(|p| p.text.contains("the table ends here: 300 of 402 models"));
+    assert!(said, "what is not shown is said");
+}
+
+#[test]
 fn a_person_can_use_the_pages() {
     let Ok(browser) = std::env::var("BRICKMEND_CHROMIUM") else {
         println!("skipped: BRICKMEND_CHROMIUM names no browser");

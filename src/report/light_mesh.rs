@@ -2,6 +2,7 @@
 //!
 //! In:         a mesh as a stream, and the box that is looked at.
 //! Out:        a [`LightMesh`]: whole, where it has few triangles; else its shape on a coarser grid.
+//!             The grid is halved until that does, and then made as fine as seems possible.
 //! Invariant:  the same whatever the order of the hash tables: sums are of integers, lists are sorted.
 //! Units:      steps of a grid of 2^16 over the longest side of the box.
 //! Memory:     the triangles that are asked for at most, 150 bytes each; one batch of the source.
@@ -20,6 +21,11 @@ use crate::report::preview::{OpenSource, PreviewError, Side};
 const STEPS: f64 = 65_535.0;
 /// Most triangles of a light mesh: with three corners each, numbers of vertices fit in 16 bits.
 pub(crate) const MOST_TRIANGLES: usize = 21_000;
+
+/// With this share of the triangles that there may be, a mesh is as fine as can be expected.
+const WELL_FILLED: f64 = 0.7;
+/// The finer grid is coarser than it might be by this factor: surfaces are not all alike.
+const FINER_MARGIN: f64 = 1.06;
 
 /// A cube that light meshes lie in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,15 +61,20 @@ impl Cube {
                 (lo, hi) = (lo.min(corner), hi.max(corner));
             }
         })?;
+        Ok(Self::of(lo, hi))
+    }
+
+    /// Around a box; `None` where it holds nothing.
+    pub(crate) fn of(lo: DVec3, hi: DVec3) -> Option<Self> {
         let length = (hi - lo).max_element();
         if !length.is_finite() {
-            return Ok(None);
+            return None;
         }
         let length = if length > 0.0 { length } else { 1.0 };
         // A mesh of the same box may reach out of it by walls that became thicker.
         let middle = lo * 0.5 + hi * 0.5;
         let side = 1.25 * length;
-        Ok(Some(Self { lo: middle - DVec3::splat(0.5 * side), side }))
+        Some(Self { lo: middle - DVec3::splat(0.5 * side), side })
     }
 
     /// The steps of a place; `None` outside of the cube.
@@ -85,13 +96,26 @@ pub(crate) fn lighten<E: std::error::Error>(
     most_triangles: usize,
     monitor: &dyn Monitor,
 ) -> Result<LightMesh, PreviewError<E>> {
-    let mut clusters = Clusters::new(most_triangles.min(MOST_TRIANGLES));
-    let of_triangles = each_triangle(side, open, monitor, |corners| {
-        if let [Some(a), Some(b), Some(c)] = corners.map(|corner| cube.steps(corner)) {
-            clusters.add([a, b, c]);
-        }
-    })?;
-    Ok(clusters.finish(of_triangles))
+    let most_triangles = most_triangles.min(MOST_TRIANGLES);
+    let cluster = |width| {
+        let mut clusters = Clusters::new(most_triangles, width);
+        let of_triangles = each_triangle(side, open, monitor, |corners| {
+            if let [Some(a), Some(b), Some(c)] = corners.map(|corner| cube.steps(corner)) {
+                clusters.add([a, b, c]);
+            }
+        })?;
+        Ok::<_, PreviewError<E>>((clusters.finish(of_triangles), clusters.width))
+    };
+    let (halved, width) = cluster(1)?;
+    let room = halved.triangles.len() as f64 / most_triangles.max(1) as f64;
+    if width == 1 || room > WELL_FILLED {
+        return Ok(halved);
+    }
+    // A surface has as many cells as the square of their number along an axis.
+    let finer = (f64::from(width) * room.sqrt() * FINER_MARGIN).ceil() as u32;
+    let (fine, _) = cluster(finer.max(1))?;
+    // Where that was too fine it was made coarser, and may have fewer triangles than before.
+    Ok(if fine.triangles.len() > halved.triangles.len() { fine } else { halved })
 }
 
 /// Calls `take` for the finite triangles; how many there are in all.
@@ -120,7 +144,7 @@ fn each_triangle<E: std::error::Error>(
     Ok(triangles)
 }
 
-/// A cell of the grid, at some level: its steps without their lowest bits.
+/// A cell of the grid: its steps over the width of a cell.
 type Cell = [u16; 3];
 
 /// What lies in a cell.
@@ -133,18 +157,19 @@ struct Place {
 /// Triangles between cells. Where they are too many, cells become eightfold.
 struct Clusters {
     most_triangles: usize,
-    level: u32,
+    /// Steps along a side of a cell.
+    width: u32,
     places: HashMap<Cell, Place>,
     triangles: HashSet<[Cell; 3]>,
 }
 
 impl Clusters {
-    fn new(most_triangles: usize) -> Self {
-        Self { most_triangles, level: 0, places: HashMap::new(), triangles: HashSet::new() }
+    fn new(most_triangles: usize, width: u32) -> Self {
+        Self { most_triangles, width, places: HashMap::new(), triangles: HashSet::new() }
     }
 
     fn add(&mut self, corners: [[u16; 3]; 3]) {
-        let cells = corners.map(|corner| corner.map(|step| step >> self.level));
+        let cells = corners.map(|corner| corner.map(|step| (u32::from(step) / self.width) as u16));
         let Some(triangle) = in_order(cells) else { return };
         for (cell, corner) in cells.into_iter().zip(corners) {
             let place = self.places.entry(cell).or_default();
@@ -158,7 +183,7 @@ impl Clusters {
     }
 
     fn coarsen(&mut self) {
-        self.level += 1;
+        self.width *= 2;
         let up = |cell: Cell| cell.map(|step| step >> 1);
         let triangles = std::mem::take(&mut self.triangles);
         self.triangles = triangles.into_iter().filter_map(|t| in_order(t.map(up))).collect();
@@ -169,8 +194,8 @@ impl Clusters {
         }
     }
 
-    fn finish(self, of_triangles: u64) -> LightMesh {
-        let mut triangles: Vec<[Cell; 3]> = self.triangles.into_iter().collect();
+    fn finish(&self, of_triangles: u64) -> LightMesh {
+        let mut triangles: Vec<[Cell; 3]> = self.triangles.iter().copied().collect();
         triangles.sort_unstable();
         let mut cells: Vec<Cell> = triangles.iter().flatten().copied().collect();
         cells.sort_unstable();
@@ -241,7 +266,7 @@ mod tests {
         assert_eq!(whole.triangles.len(), ball.len());
         assert_eq!(2 * whole.vertices.len(), ball.len() + 4, "closed, without handles");
         let few = light(&ball, 200);
-        assert!((50..=200).contains(&few.triangles.len()), "{}", few.triangles.len());
+        assert!((100..=200).contains(&few.triangles.len()), "{}", few.triangles.len());
         assert_eq!(few.of_triangles, ball.len() as u64);
         assert_eq!(few, light(&ball, 200), "no order of a hash table shows");
     }

@@ -138,10 +138,10 @@ fn text_of(told: &Told) -> String {
         Some(file) => lines.push(format!("file: {file}")),
         None => lines.push("no file: brickmend.toml is not in this folder".to_owned()),
     }
-    lines.extend(told.settings.iter().map(|setting| line_of(setting)));
+    lines.extend(told.settings.iter().map(line_of));
     for folder in &told.folders {
         lines.push(format!("for {}:", folder.pattern));
-        lines.extend(folder.settings.iter().map(|setting| line_of(setting)));
+        lines.extend(folder.settings.iter().map(line_of));
     }
     lines.iter().map(|line| on_one_line(line)).collect::<Vec<_>>().join("\n")
 }

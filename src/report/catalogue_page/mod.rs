@@ -20,7 +20,6 @@ use crate::report::catalogue_page::rows::Surroundings;
 use crate::report::error::Halt;
 use crate::report::html::{Frame, Markup, way_between, write_page};
 use crate::report::image_staged::StagedFile;
-use crate::report::preview::PreviewError;
 
 /// Folder of pages and pictures, in that of a catalogue's own files.
 pub const FOLDER: &str = "report";
@@ -83,7 +82,7 @@ pub fn write_catalogue_page(
         })
         .map_err(|halt: Halt| halt.at(path))?;
     drop(out);
-    staged.put_in_place().map_err(PreviewError::<IoError>::from)?;
+    staged.put_in_place::<IoError>()?;
     Ok(totals)
 }
 

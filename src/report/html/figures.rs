@@ -100,7 +100,7 @@ mod tests {
         assert_eq!(count(12), "12");
         assert_eq!(bytes(1536), "1.5\u{202f}KiB");
         assert_eq!(bytes(999), "999\u{202f}B");
-        assert_eq!(seconds(3.14159), "3.14\u{202f}s");
+        assert_eq!(seconds(3.256), "3.26\u{202f}s");
         assert_eq!(seconds(3700.0), "61:40\u{202f}min");
         assert_eq!(decimal(0.125), "0.125");
         assert_eq!(decimal(1234.0), "1234");

@@ -9,7 +9,6 @@ use crate::monitor::Monitor;
 use crate::report::image_staged::StagedFile;
 use crate::report::model_page::{look, write_shown};
 use crate::report::pictures::Picture;
-use crate::report::preview::PreviewError;
 use crate::report::{INDEX, ModelPage, PageOptions, ReportError};
 use crate::store::Scratch;
 
@@ -112,6 +111,6 @@ fn write_picture(path: &Path, picture: &Picture) -> Result<(), ReportError> {
     let staged = StagedFile::create::<IoError>(path)?;
     let written = picture.encode().and_then(|bytes| staged.file().write_all(&bytes));
     written.map_err(|source| ReportError::Write { path: path.to_path_buf(), source })?;
-    staged.put_in_place().map_err(PreviewError::<IoError>::from)?;
+    staged.put_in_place::<IoError>()?;
     Ok(())
 }

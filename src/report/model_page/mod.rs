@@ -27,7 +27,7 @@ use crate::report::image_staged::StagedFile;
 use crate::report::light_mesh::{Cube, LightMesh, lighten};
 use crate::report::pictures::{Picture, draw_pair};
 use crate::report::preview::scene::Scene;
-use crate::report::preview::{OpenSource, PreviewError, PreviewOptions, Side};
+use crate::report::preview::{OpenSource, PreviewOptions, Side};
 use crate::store::Scratch;
 
 const COMPARE: &str = include_str!("../html/assets/compare.js");
@@ -115,7 +115,10 @@ fn look(
     let pictures = draw_pair(&scene, &preview)?;
     let mut shown = Shown { pictures, cube: None, meshes: Default::default() };
     if options.mesh_triangles > 0 {
-        shown.cube = Cube::around(Side::Output, output, monitor)?;
+        shown.cube = match model.outcome.and_then(|outcome| outcome.output.proof.bounds) {
+            Some([lo, hi]) => Cube::of(lo.into(), hi.into()),
+            None => Cube::around(Side::Output, output, monitor)?,
+        };
     }
     if let Some(cube) = &shown.cube {
         let most = options.mesh_triangles;
@@ -151,6 +154,6 @@ fn write_shown(path: &Path, model: &ModelPage, shown: &Shown) -> Result<(), Repo
     let flushed = written.and_then(|()| out.flush());
     flushed.map_err(|error: io::Error| Halt::from(error).at(path))?;
     drop(out);
-    staged.put_in_place().map_err(PreviewError::<IoError>::from)?;
+    staged.put_in_place::<IoError>()?;
     Ok(())
 }
