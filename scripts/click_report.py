@@ -17,7 +17,7 @@ import sys
 
 from playwright.sync_api import sync_playwright
 
-SIZES = {"desktop": (1280, 900), "phone": (390, 844)}
+SIZES = {"desktop": (1280, 900), "phone": (390, 844), "narrow": (320, 640)}
 # WebGL without a graphics card.
 FLAGS = ["--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"]
 if os.geteuid() == 0:
@@ -168,7 +168,7 @@ def open_page(browser, path, click, shots, kind):
             words = f"{kind}, {size}, {scheme}"
             context = browser.new_context(
                 viewport={"width": width, "height": height}, color_scheme=scheme,
-                device_scale_factor=2 if size == "phone" else 1)
+                device_scale_factor=1 if size == "desktop" else 2)
             page = context.new_page()
             faults = []
             page.on("console", lambda message: faults.append(message.text)

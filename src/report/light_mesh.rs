@@ -2,18 +2,18 @@
 //!
 //! In:         a mesh as a stream, and the box that is looked at.
 //! Out:        a [`LightMesh`]: whole, where it has few triangles; else its shape on a coarser grid.
-//!             The grid is halved until that does, and then made as fine as seems possible.
 //! Invariant:  the same whatever the order of the hash tables: sums are of integers, lists are sorted.
 //! Units:      steps of a grid of 2^16 over the longest side of the box.
 //! Memory:     the triangles that are asked for at most, 150 bytes each; one batch of the source.
 //! Source:     J. Rossignac, P. Borrel, Multi-resolution 3D approximations, 1993 (clustering on a
 //!             grid); P. Lindstrom, Out-of-core simplification, 2000 (in one pass over the stream).
 
+use std::cell::RefCell;
 use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
-use crate::mesh::TriangleBatch;
+use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::report::preview::{OpenSource, PreviewError, Side};
 
@@ -22,10 +22,9 @@ const STEPS: f64 = 65_535.0;
 /// Most triangles of a light mesh: with three corners each, numbers of vertices fit in 16 bits.
 pub(crate) const MOST_TRIANGLES: usize = 21_000;
 
-/// With this share of the triangles that there may be, a mesh is as fine as can be expected.
-const WELL_FILLED: f64 = 0.7;
-/// The finer grid is coarser than it might be by this factor: surfaces are not all alike.
-const FINER_MARGIN: f64 = 1.06;
+/// Triangles for each cell that a surface meets, on average: two where it runs along the grid, and less
+/// than this where it is askew.
+const TRIANGLES_PER_CELL: f64 = 3.0;
 
 /// A cube that light meshes lie in.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -55,12 +54,22 @@ impl Cube {
         open: &OpenSource<'_, E>,
         monitor: &dyn Monitor,
     ) -> Result<Option<Self>, PreviewError<E>> {
+        let failed = |source| PreviewError::Source { side, source };
         let (mut lo, mut hi) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
-        each_triangle(side, open, monitor, |corners| {
-            for corner in corners {
-                (lo, hi) = (lo.min(corner), hi.max(corner));
+        let mut source = open().map_err(failed)?;
+        let mut batch = TriangleBatch::default();
+        while source.next_batch(&mut batch).map_err(failed)? {
+            if monitor.cancelled() {
+                return Err(PreviewError::Cancelled);
             }
-        })?;
+            for corners in &batch.corners {
+                let corners = corners.map(DVec3::from_array);
+                if corners.iter().all(|corner| corner.is_finite()) {
+                    let [a, b, c] = corners;
+                    (lo, hi) = (lo.min(a).min(b).min(c), hi.max(a).max(b).max(c));
+                }
+            }
+        }
         Ok(Self::of(lo, hi))
     }
 
@@ -85,63 +94,82 @@ impl Cube {
     }
 }
 
-/// Reads a mesh into a light one. What lies outside of the cube is left out.
-///
-/// # Errors
-/// The source fails, or the caller asks to stop.
-pub(crate) fn lighten<E: std::error::Error>(
-    side: Side,
-    open: &OpenSource<'_, E>,
-    cube: &Cube,
-    most_triangles: usize,
-    monitor: &dyn Monitor,
-) -> Result<LightMesh, PreviewError<E>> {
-    let most_triangles = most_triangles.min(MOST_TRIANGLES);
-    let cluster = |width| {
-        let mut clusters = Clusters::new(most_triangles, width);
-        let of_triangles = each_triangle(side, open, monitor, |corners| {
-            if let [Some(a), Some(b), Some(c)] = corners.map(|corner| cube.steps(corner)) {
-                clusters.add([a, b, c]);
-            }
-        })?;
-        Ok::<_, PreviewError<E>>((clusters.finish(of_triangles), clusters.width))
-    };
-    let (halved, width) = cluster(1)?;
-    let room = halved.triangles.len() as f64 / most_triangles.max(1) as f64;
-    if width == 1 || room > WELL_FILLED {
-        return Ok(halved);
-    }
-    // A surface has as many cells as the square of their number along an axis.
-    let finer = (f64::from(width) * room.sqrt() * FINER_MARGIN).ceil() as u32;
-    let (fine, _) = cluster(finer.max(1))?;
-    // Where that was too fine it was made coarser, and may have fewer triangles than before.
-    Ok(if fine.triangles.len() > halved.triangles.len() { fine } else { halved })
+/// What is known of a mesh before it is read.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Known {
+    /// How many triangles it has.
+    pub(crate) triangles: u64,
+    /// Their area, model units squared.
+    pub(crate) area: f64,
 }
 
-/// Calls `take` for the finite triangles; how many there are in all.
-fn each_triangle<E: std::error::Error>(
-    side: Side,
-    open: &OpenSource<'_, E>,
-    monitor: &dyn Monitor,
-    mut take: impl FnMut([DVec3; 3]),
-) -> Result<u64, PreviewError<E>> {
-    let failed = |source| PreviewError::Source { side, source };
-    let mut source = open().map_err(failed)?;
-    let mut batch = TriangleBatch::default();
-    let mut triangles = 0;
-    while source.next_batch(&mut batch).map_err(failed)? {
-        if monitor.cancelled() {
-            return Err(PreviewError::Cancelled);
-        }
-        triangles += batch.len() as u64;
+/// A light mesh that comes to be while somebody else reads the mesh.
+pub(crate) struct Lightening {
+    cube: Cube,
+    clusters: Clusters,
+    of_triangles: u64,
+}
+
+impl Lightening {
+    /// Of at most so many triangles; what lies outside of the cube is left out. With what is known of
+    /// the mesh the first grid is about right; else it begins with the finest, and is halved.
+    pub(crate) fn new(cube: Cube, most_triangles: usize, known: Option<Known>) -> Self {
+        let most_triangles = most_triangles.min(MOST_TRIANGLES);
+        let width = match known {
+            Some(known) if known.triangles > most_triangles as u64 => {
+                let cells = most_triangles as f64 / TRIANGLES_PER_CELL;
+                let width = (known.area / cells).sqrt() / cube.side * STEPS;
+                if width.is_finite() { width.clamp(1.0, STEPS) as u32 } else { 1 }
+            }
+            _ => 1,
+        };
+        Self { cube, clusters: Clusters::new(most_triangles, width), of_triangles: 0 }
+    }
+
+    /// Takes the next triangles.
+    pub(crate) fn hear(&mut self, batch: &TriangleBatch) {
+        self.of_triangles += batch.len() as u64;
         for corners in &batch.corners {
-            let corners = corners.map(DVec3::from_array);
-            if corners.iter().all(|corner| corner.is_finite()) {
-                take(corners);
+            let steps = corners.map(|corner| self.cube.steps(DVec3::from_array(corner)));
+            if let [Some(a), Some(b), Some(c)] = steps {
+                self.clusters.add([a, b, c]);
             }
         }
     }
-    Ok(triangles)
+
+    /// What came of it.
+    pub(crate) fn finish(self) -> LightMesh {
+        self.clusters.finish(self.of_triangles)
+    }
+}
+
+/// A mesh of which a light one is made as it is read.
+pub(crate) struct Overheard<'h, E> {
+    /// The mesh.
+    pub(crate) source: Box<dyn MeshSource<Error = E> + 'h>,
+    /// Who hears it.
+    pub(crate) lightening: &'h RefCell<Lightening>,
+}
+
+impl<E: std::error::Error> MeshSource for Overheard<'_, E> {
+    type Error = E;
+
+    fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, E> {
+        let is_more = self.source.next_batch(batch)?;
+        if is_more {
+            self.lightening.borrow_mut().hear(batch);
+        }
+        Ok(is_more)
+    }
+    fn discarded(&self) -> Discarded {
+        self.source.discarded()
+    }
+    fn bytes_read(&self) -> u64 {
+        self.source.bytes_read()
+    }
+    fn vertex_count(&self) -> Option<u64> {
+        self.source.vertex_count()
+    }
 }
 
 /// A cell of the grid: its steps over the width of a cell.
@@ -194,8 +222,8 @@ impl Clusters {
         }
     }
 
-    fn finish(&self, of_triangles: u64) -> LightMesh {
-        let mut triangles: Vec<[Cell; 3]> = self.triangles.iter().copied().collect();
+    fn finish(self, of_triangles: u64) -> LightMesh {
+        let mut triangles: Vec<[Cell; 3]> = self.triangles.into_iter().collect();
         triangles.sort_unstable();
         let mut cells: Vec<Cell> = triangles.iter().flatten().copied().collect();
         cells.sort_unstable();
@@ -226,7 +254,6 @@ fn in_order([a, b, c]: [Cell; 3]) -> Option<[Cell; 3]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::mesh::MeshSource;
     use crate::mesh::shapes::{Corners, sphere};
     use crate::monitor::Void;
 
@@ -242,8 +269,8 @@ mod tests {
             }
             Ok(!batch.is_empty())
         }
-        fn discarded(&self) -> crate::mesh::Discarded {
-            crate::mesh::Discarded::default()
+        fn discarded(&self) -> Discarded {
+            Discarded::default()
         }
         fn bytes_read(&self) -> u64 {
             0
@@ -253,32 +280,54 @@ mod tests {
         }
     }
 
-    fn light(triangles: &[Corners], most: usize) -> LightMesh {
-        let open = || Ok(Box::new(Listed(triangles.to_vec())) as Box<dyn MeshSource<Error = _>>);
-        let cube = Cube::around(Side::Output, &open, &Void).expect("no error").expect("a box");
-        lighten(Side::Output, &open, &cube, most, &Void).expect("no error")
+    fn open(triangles: &[Corners]) -> Box<dyn MeshSource<Error = std::io::Error>> {
+        Box::new(Listed(triangles.to_vec()))
+    }
+
+    fn light(triangles: &[Corners], most: usize, known: Option<Known>) -> LightMesh {
+        let cube = Cube::around(Side::Output, &|| Ok(open(triangles)), &Void);
+        let cube = cube.expect("no error").expect("a box");
+        let lightening = RefCell::new(Lightening::new(cube, most, known));
+        let mut overheard = Overheard { source: open(triangles), lightening: &lightening };
+        let mut batch = TriangleBatch::default();
+        while overheard.next_batch(&mut batch).expect("no error") {}
+        drop(overheard);
+        lightening.into_inner().finish()
     }
 
     #[test]
     fn a_small_mesh_is_whole_and_a_large_one_is_as_small_as_asked_for() {
         let ball = sphere([1.0, 2.0, 3.0], 4.0, 24);
-        let whole = light(&ball, MOST_TRIANGLES);
+        let whole = light(&ball, MOST_TRIANGLES, None);
         assert_eq!(whole.triangles.len(), ball.len());
         assert_eq!(2 * whole.vertices.len(), ball.len() + 4, "closed, without handles");
-        let few = light(&ball, 200);
-        assert!((100..=200).contains(&few.triangles.len()), "{}", few.triangles.len());
+        let few = light(&ball, 200, None);
+        assert!((50..=200).contains(&few.triangles.len()), "{}", few.triangles.len());
         assert_eq!(few.of_triangles, ball.len() as u64);
-        assert_eq!(few, light(&ball, 200), "no order of a hash table shows");
+        assert_eq!(few, light(&ball, 200, None), "no order of a hash table shows");
+    }
+
+    #[test]
+    fn what_is_known_before_makes_the_grid_about_right() {
+        for rings in [24, 40] {
+            let ball = sphere([0.0; 3], 1.0, rings);
+            let known = Known { triangles: ball.len() as u64, area: 4.0 * std::f64::consts::PI };
+            for most in [300, 900] {
+                let found = light(&ball, most, Some(known)).triangles.len();
+                assert!((most / 3..=most).contains(&found), "{found} of {most}");
+            }
+            let whole = light(&ball, MOST_TRIANGLES, Some(known));
+            assert_eq!(whole.triangles.len(), ball.len());
+        }
     }
 
     #[test]
     fn broken_corners_are_left_out() {
         let mut triangles = sphere([0.0; 3], 1.0, 6);
-        let sound = light(&triangles, 1000);
+        let sound = light(&triangles, 1000, None);
         triangles.push([[f64::NAN; 3], [0.0; 3], [1.0; 3]]);
-        assert_eq!(light(&triangles, 1000).triangles, sound.triangles);
-        let nothing =
-            || Ok(Box::new(Listed(Vec::new())) as Box<dyn MeshSource<Error = std::io::Error>>);
-        assert_eq!(Cube::around(Side::Output, &nothing, &Void).expect("no error"), None);
+        assert_eq!(light(&triangles, 1000, None).triangles, sound.triangles);
+        let nothing = Cube::around(Side::Output, &|| Ok(open(&[])), &Void);
+        assert_eq!(nothing.expect("no error"), None);
     }
 }

@@ -13,6 +13,7 @@ mod plot;
 
 pub use gallery::Gallery;
 
+use std::cell::{Cell, RefCell};
 use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
@@ -24,7 +25,7 @@ use crate::report::ReportError;
 use crate::report::error::Halt;
 use crate::report::html::{Frame, write_page};
 use crate::report::image_staged::StagedFile;
-use crate::report::light_mesh::{Cube, LightMesh, lighten};
+use crate::report::light_mesh::{Cube, Known, LightMesh, Lightening, Overheard};
 use crate::report::pictures::{Picture, draw_pair};
 use crate::report::preview::scene::Scene;
 use crate::report::preview::{OpenSource, PreviewOptions, Side};
@@ -76,7 +77,7 @@ impl PageOptions {
 /// What a page shows.
 struct Shown {
     pictures: [Picture; 2],
-    cube: Option<Cube>,
+    has_meshes: bool,
     meshes: [LightMesh; 2],
 }
 
@@ -96,6 +97,7 @@ pub fn write_model_page(
     write_shown(path, model, &shown)
 }
 
+/// Draws both sides. The light meshes come to be when each side is read for the first time.
 fn look(
     model: &ModelPage,
     options: &PageOptions,
@@ -107,27 +109,44 @@ fn look(
         let source = crate::io::open(path, scratch, &ReadOptions { share_bytes })?;
         Ok(source as Box<dyn MeshSource<Error = IoError>>)
     };
-    let input: &OpenSource<IoError> = &|| open(model.input);
-    let output: &OpenSource<IoError> = &|| open(model.output);
-    let scene = Scene { input, output: Some(output), monitor };
+    let cube = match model.outcome.and_then(|outcome| outcome.output.proof.bounds) {
+        _ if options.mesh_triangles == 0 => None,
+        Some([lo, hi]) => Cube::of(lo.into(), hi.into()),
+        None => Cube::around(Side::Output, &|| open(model.output), monitor)?,
+    };
+    let lightenings = known(model).map(|known| {
+        cube.map(|cube| RefCell::new(Lightening::new(cube, options.mesh_triangles, known)))
+    });
+    let heard = [Cell::new(false), Cell::new(false)];
+    let overhear = |side: usize, path: &Path| {
+        let source = open(path)?;
+        Ok(match &lightenings[side] {
+            Some(lightening) if !heard[side].replace(true) => {
+                Box::new(Overheard { source, lightening }) as Box<dyn MeshSource<Error = IoError>>
+            }
+            _ => source,
+        })
+    };
     let (width_px, height_px) = (options.picture_px, options.picture_px);
     let preview = PreviewOptions { width_px, height_px, share_bytes, ..PreviewOptions::default() };
-    let pictures = draw_pair(&scene, &preview)?;
-    let mut shown = Shown { pictures, cube: None, meshes: Default::default() };
-    if options.mesh_triangles > 0 {
-        shown.cube = match model.outcome.and_then(|outcome| outcome.output.proof.bounds) {
-            Some([lo, hi]) => Cube::of(lo.into(), hi.into()),
-            None => Cube::around(Side::Output, output, monitor)?,
-        };
-    }
-    if let Some(cube) = &shown.cube {
-        let most = options.mesh_triangles;
-        shown.meshes = [
-            lighten(Side::Input, input, cube, most, monitor)?,
-            lighten(Side::Output, output, cube, most, monitor)?,
-        ];
-    }
-    Ok(shown)
+    let pictures = {
+        let input: &OpenSource<IoError> = &|| overhear(0, model.input);
+        let output: &OpenSource<IoError> = &|| overhear(1, model.output);
+        draw_pair(&Scene { input, output: Some(output), monitor }, &preview)?
+    };
+    let meshes = lightenings.map(|lightening| {
+        lightening.map_or_else(LightMesh::default, |lightening| lightening.into_inner().finish())
+    });
+    Ok(Shown { pictures, has_meshes: cube.is_some(), meshes })
+}
+
+/// What the outcome says of both sides.
+fn known(model: &ModelPage) -> [Option<Known>; 2] {
+    let Some(outcome) = model.outcome else { return [None, None] };
+    let (input, proof) = (&outcome.input, &outcome.output.proof);
+    let before = Known { triangles: input.stats.triangles, area: input.measure.area };
+    let after = Known { triangles: proof.triangles, area: proof.area };
+    [Some(before), Some(after)]
 }
 
 fn write_shown(path: &Path, model: &ModelPage, shown: &Shown) -> Result<(), ReportError> {
@@ -138,12 +157,9 @@ fn write_shown(path: &Path, model: &ModelPage, shown: &Shown) -> Result<(), Repo
         facts::write_verdict(html, model)?;
         html.element("div", &[("class", "looks")], |html| {
             carried::write_pictures(html, &shown.pictures)?;
-            match shown.cube {
-                Some(_) => carried::write_viewer(html, &shown.meshes),
-                None => Ok(()),
-            }
+            if shown.has_meshes { carried::write_viewer(html, &shown.meshes) } else { Ok(()) }
         })?;
-        if shown.cube.is_some() {
+        if shown.has_meshes {
             carried::write_meshes(html, &shown.meshes)?;
         }
         let Some(outcome) = model.outcome else { return Ok(()) };
