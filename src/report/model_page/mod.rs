@@ -34,6 +34,11 @@ use crate::store::Scratch;
 const COMPARE: &str = include_str!("../html/assets/compare.js");
 const VIEWER: &str = include_str!("../html/assets/viewer.js");
 
+/// Pictures are no smaller than this, however small the share is.
+const LEAST_PX: u32 = 128;
+/// What a triangle of a light mesh takes while that comes to be.
+const TRIANGLE_BYTES: u64 = 150;
+
 /// What a page tells of.
 #[derive(Clone, Copy, Debug)]
 pub struct ModelPage<'p> {
@@ -61,16 +66,27 @@ pub struct PageOptions {
 }
 
 impl PageOptions {
-    /// For one page.
+    /// For one page; smaller where the share is.
     #[must_use]
-    pub const fn large(share_bytes: u64) -> Self {
-        Self { picture_px: 960, mesh_triangles: 20_000, share_bytes }
+    pub fn large(share_bytes: u64) -> Self {
+        Self::within(share_bytes, 1024, 20_000)
     }
 
-    /// For thousands of pages.
+    /// For thousands of pages; smaller where the share is.
     #[must_use]
-    pub const fn small(share_bytes: u64) -> Self {
-        Self { picture_px: 512, mesh_triangles: 12_000, share_bytes }
+    pub fn small(share_bytes: u64) -> Self {
+        Self::within(share_bytes, 512, 12_000)
+    }
+
+    /// Half of the share is for the pictures at most, half for the meshes.
+    fn within(share_bytes: u64, picture_px: u32, mesh_triangles: u64) -> Self {
+        let pair_bytes = |px: u32| 6 * u64::from(px) * u64::from(px);
+        let mut picture_px = picture_px;
+        while picture_px > LEAST_PX && 2 * pair_bytes(picture_px) > share_bytes {
+            picture_px /= 2;
+        }
+        let most = share_bytes / (4 * TRIANGLE_BYTES);
+        Self { picture_px, mesh_triangles: mesh_triangles.min(most) as usize, share_bytes }
     }
 }
 
@@ -172,4 +188,18 @@ fn write_shown(path: &Path, model: &ModelPage, shown: &Shown) -> Result<(), Repo
     drop(out);
     staged.put_in_place::<IoError>()?;
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_small_share_gives_a_small_page() {
+        let plenty = PageOptions::small(1 << 30);
+        assert_eq!((plenty.picture_px, plenty.mesh_triangles), (512, 12_000));
+        let little = PageOptions::small(2 << 20);
+        assert_eq!((little.picture_px, little.mesh_triangles), (256, 3_495));
+        assert_eq!(PageOptions::large(0).picture_px, LEAST_PX);
+    }
 }
