@@ -41,7 +41,7 @@ fn text_of(workshop: &Workshop, triangles: &[Textured]) -> String {
 /// What our own reader finds in a file.
 fn read(path: &Path) -> TriangleBatch {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     let mut source = open(path, &Scratch::new(folder.path()), &options).expect("opens");
     let (mut batch, mut all) = (TriangleBatch::default(), TriangleBatch::default());
     while source.next_batch(&mut batch).expect("reads") {
@@ -62,6 +62,9 @@ fn repair(
     let repaired =
         workshop.repair(&input, extension, settings, &Limits::default()).expect("a result");
     Surface::read_proven(&repaired.path, FillRule::Solid);
+    let mut work_folder = repaired.path.clone().into_os_string();
+    work_folder.push(".brickmend");
+    assert!(!Path::new(&work_folder).exists(), "nothing is left of the work");
     let found = read(&repaired.path);
     assert_eq!(found.uvs.len(), found.corners.len(), "every triangle has coordinates");
     let uvs = found.uvs.iter().map(|uvs| uvs.map(|uv| uv.map(f64::from)));
@@ -372,7 +375,7 @@ fn a_vertex_of_glb_is_split_at_seams_and_creases_only() {
     let settings = Settings { normals: NormalRule::Smooth, ..unclustered(5) };
     let repaired = workshop.repair(&input, "glb", &settings, &Limits::default()).expect("a result");
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     let mut source = open(&repaired.path, &Scratch::new(folder.path()), &options).expect("opens");
     let mut uses: HashMap<[u64; 3], Vec<u32>> = HashMap::new();
     let mut batch = TriangleBatch::default();

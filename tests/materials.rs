@@ -75,7 +75,7 @@ fn text_of(library: &Path, parts: &[(&str, &[Corners])]) -> String {
 /// What our own reader finds in a file.
 fn read(path: &Path) -> Painted {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     let mut source = open(path, &Scratch::new(folder.path()), &options).expect("opens");
     let mut batch = TriangleBatch::default();
     let mut painted = Painted::new();

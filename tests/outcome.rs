@@ -10,7 +10,10 @@ use support::schema::check_document;
 use support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 49] = [
+const CONDITIONAL: [&str; 52] = [
+    "part.number",
+    "part.name",
+    "part.places",
     "hidden.largest[]",
     "hidden.largest[].part",
     "hidden.largest[].part_number",

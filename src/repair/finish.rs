@@ -48,6 +48,7 @@ pub fn conclude(
     Outcome {
         schema: SCHEMA_VERSION,
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        part: None,
         verdict,
         reasons,
         input: SoupReport {

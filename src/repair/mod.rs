@@ -21,6 +21,7 @@ mod lock;
 mod mending;
 mod outcome;
 mod painting;
+mod parts;
 mod plan;
 mod revising;
 mod run;
@@ -45,6 +46,7 @@ pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
+pub use parts::{LeftOut, PartReport, PartsOutcome, repair_parts};
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, Settings, ThinRule};
+pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, PartsRule, Settings, ThinRule};
