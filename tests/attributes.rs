@@ -1,8 +1,6 @@
 //! Texture coordinates, colours and normals reach the output: without smears, split where seams and
 //! creases were and nowhere else.
 
-mod support;
-
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::fmt::Write;

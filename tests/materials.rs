@@ -1,7 +1,5 @@
 //! Materials reach the output: with the area that they had, along the borders that they had.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -151,7 +149,7 @@ fn borders_around_a_ball_stay_where_they_were() {
 
 #[test]
 fn without_clusters_borders_stay_as_well() {
-    let settings = support::run::unclustered(6);
+    let settings = crate::support::run::unclustered(6);
     assert_painted_alike(&cuboid([0.0; 3], [1.0; 3]), "cube", &settings);
 }
 

@@ -1,7 +1,5 @@
 //! Parts that are kept apart: names, places, what is shared; each of them sound; hidden ones gone.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -212,7 +210,7 @@ fn the_documentation_names_every_field_of_the_whole() {
         separate(&scene(folder.path()), &output, &settings(5), &Limits::default()).expect("sound");
     whole.peak_bytes = Some(0);
     let json = serde_json::to_value(&whole).expect("plain data is always JSON");
-    support::schema::check_document("docs/parts.md", &json, &["left_out[]"]);
+    crate::support::schema::check_document("docs/parts.md", &json, &["left_out[]"]);
 }
 
 #[test]

@@ -1,7 +1,5 @@
 //! Units are carried from file to file, and lengths may be given in them.
 
-mod support;
-
 use std::path::Path;
 
 use brickmend::io::{ReadOptions, open};
