@@ -6,11 +6,14 @@ use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
 
-use brickmend::io::{ReadOptions, open};
+use brickmend::io::{Format, ReadOptions, open};
 use brickmend::mesh::TriangleBatch;
 use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, sphere};
 use brickmend::monitor::Void;
-use brickmend::repair::{Limits, NormalRule, Outcome, Reach, Settings, repair_levels};
+use brickmend::repair::{
+    Limits, NormalRule, Outcome, Reach, Settings, TextureRule, repair as repair_model,
+    repair_levels,
+};
 use brickmend::sign::FillRule;
 use brickmend::store::Scratch;
 use glam::{DMat3, DVec2, DVec3};
@@ -504,6 +507,33 @@ fn without_attributes_nothing_is_drawn_twice() {
 }
 
 #[test]
+fn images_come_along_on_request() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (inputs, results) = (folder.path().join("inputs"), folder.path().join("results"));
+    for folder in [&inputs, &results] {
+        std::fs::create_dir(folder).expect("a folder");
+    }
+    let (triangles, _) = cube(DMat3::IDENTITY);
+    let workshop = Workshop::new();
+    let model = text_of(&workshop, &triangles).replacen("mtllib ", "mtllib cube.mtl\n#", 1);
+    std::fs::write(inputs.join("cube.obj"), model).expect("written");
+    std::fs::write(inputs.join("cube.mtl"), "newmtl skin\nmap_Kd oak.png\n").expect("written");
+    let image = b"\x89PNG\r\n\x1a\n and what follows";
+    std::fs::write(inputs.join("oak.png"), image).expect("written");
+    for textures in [TextureRule::Refer, TextureRule::Copy] {
+        let settings = Settings { textures, ..at_depth(5) };
+        let output = results.join(format!("{textures:?}.obj"));
+        let (input, limits) = (inputs.join("cube.obj"), Limits::default());
+        repair_model(&input, &output, Format::Obj, &settings, &limits, &Void).expect("a result");
+        let library = std::fs::read_to_string(output.with_extension("mtl")).expect("a library");
+        let way = library.lines().find_map(|line| line.strip_prefix("map_Kd ")).expect("an image");
+        let is_copied = textures == TextureRule::Copy;
+        assert_eq!(way.starts_with("../inputs/"), !is_copied, "{way}");
+        assert_eq!(std::fs::read(results.join(way)).expect("it is there"), image);
+    }
+}
+
+#[test]
 fn images_folded_along_an_edge_part_looks_there() {
     // Both halves of the upper side show the same half of the image.
     let fold = 0.43;
@@ -545,7 +575,7 @@ fn levels_have_the_attributes_that_a_run_for_each_gives() {
     let settings = Settings { normals: NormalRule::Smooth, ..at_depth(6) };
     let output = input.with_file_name("levels.glb");
     let limits = Limits::default();
-    let format = brickmend::io::Format::Glb;
+    let format = Format::Glb;
     let outcomes =
         repair_levels(&input, &output, format, &settings, &levels, &limits, &Void).expect("files");
     for (outcome, decimate) in outcomes.iter().zip(levels) {

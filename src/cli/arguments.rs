@@ -7,7 +7,8 @@ use brickmend::ingest::SheetRule;
 use brickmend::io::Format;
 use brickmend::mesh::LengthUnit;
 use brickmend::repair::{
-    Depth, HiddenRule, Length, Limits, MaxHole, NormalRule, PartsRule, Reach, Settings, ThinRule,
+    Depth, HiddenRule, Length, Limits, MaxHole, NormalRule, PartsRule, Reach, Settings,
+    TextureRule, ThinRule,
 };
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
@@ -79,6 +80,10 @@ pub struct ResultArguments {
     /// input has some (keep) or always (smooth).
     #[arg(long, value_enum, default_value_t = NormalRuleName::Keep)]
     normals: NormalRuleName,
+    /// Where images lie that the output names and does not hold, in OBJ and PLY [default: refer; copy
+    /// for batch].
+    #[arg(long, value_enum)]
+    pub textures: Option<TextureRuleName>,
     /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ,
     /// PLY, 3MF and GLB.
     #[arg(long)]
@@ -149,6 +154,14 @@ enum HiddenRuleName {
     Remove,
     /// They stay, unless they are sealed in.
     Keep,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TextureRuleName {
+    /// Those beside the input stay there; those inside of it come beside the output.
+    Refer,
+    /// All come beside the output.
+    Copy,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -250,6 +263,10 @@ impl ResultArguments {
             NormalRuleName::Smooth => NormalRule::Smooth,
             NormalRuleName::None => NormalRule::None,
         };
+        let textures = match self.textures {
+            None | Some(TextureRuleName::Refer) => TextureRule::Refer,
+            Some(TextureRuleName::Copy) => TextureRule::Copy,
+        };
         Settings {
             depth,
             fill_rule,
@@ -266,6 +283,7 @@ impl ResultArguments {
             max_triangles,
             unit: self.units,
             to_unit: self.to_units,
+            textures,
             normals,
             tag_patches: self.tag_patches,
             strict,

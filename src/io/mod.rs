@@ -202,6 +202,9 @@ pub struct WriteOptions {
     pub attributes: Attributes,
     /// Where parts stand, for formats that have scenes; each where its vertices are if `None`.
     pub scene: Option<SceneTree>,
+    /// Whether images that the output names and does not hold lie beside it; else those that lie
+    /// beside the input stay there.
+    pub copies_images: bool,
     /// Where the output will be in the end: the ways to images lead from there.
     pub output: PathBuf,
     /// What a model unit is, for formats that say so (3MF, GLB).

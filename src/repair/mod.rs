@@ -49,4 +49,6 @@ pub use outcome::{
 pub use parts::{LeftOut, PartReport, PartsOutcome, repair_parts};
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, PartsRule, Settings, ThinRule};
+pub use settings::{
+    Depth, HiddenRule, Limits, MaxHole, NormalRule, PartsRule, Settings, TextureRule, ThinRule,
+};

@@ -118,6 +118,17 @@ pub enum PartsRule {
     Separate,
 }
 
+/// Where images lie that an output names and does not hold (OBJ, PLY).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TextureRule {
+    /// Those beside the input stay there; those inside of it come beside the output.
+    #[default]
+    Refer,
+    /// All come beside the output.
+    Copy,
+}
+
 /// Everything that changes the result.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -154,6 +165,9 @@ pub struct Settings {
     /// The unit that numbers are turned into; they stay as they are if `None`.
     #[serde(default)]
     pub to_unit: Option<LengthUnit>,
+    /// Where images lie that the output does not hold.
+    #[serde(default)]
+    pub textures: TextureRule,
     /// Which normals the output gets.
     pub normals: NormalRule,
     /// Whether what closes openings is told apart in the output, where its format can.
@@ -180,6 +194,7 @@ impl Default for Settings {
             max_triangles: None,
             unit: None,
             to_unit: None,
+            textures: TextureRule::Refer,
             normals: NormalRule::Keep,
             tag_patches: false,
             strict: false,

@@ -12,7 +12,7 @@ use crate::io::{
 use crate::repair::RepairError;
 use crate::repair::outcome::TransferReport;
 use crate::repair::run::Run;
-use crate::repair::settings::NormalRule;
+use crate::repair::settings::{NormalRule, TextureRule};
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
 use crate::store::FileState;
@@ -82,6 +82,7 @@ impl Run<'_> {
             tag_patches: self.settings.tag_patches,
             attributes: self.attributes(findings),
             scene: None,
+            copies_images: self.settings.textures == TextureRule::Copy,
             output: workspace.output_path(),
             unit,
             library,

@@ -50,7 +50,7 @@ use crate::repair::plan::MemoryPlan;
 use crate::repair::run::{
     Feed, InputIdentity, MOST_WAYS_BACK, Run, keep_input, part_key, run_key, start_threads,
 };
-use crate::repair::settings::{Limits, Settings};
+use crate::repair::settings::{Limits, Settings, TextureRule};
 use crate::repair::stages::{Findings, Handles, check_converted};
 use crate::repair::standing::{CONCLUDED, FOUND};
 use crate::repair::step::Step;
@@ -259,6 +259,7 @@ impl Assembly<'_> {
             palette: has_palette.then(|| palette.with_images(images, self.input)),
             tag_patches: self.settings.tag_patches,
             attributes: self.settings.gets(self.format, scattered.attributes()),
+            copies_images: self.settings.textures == TextureRule::Copy,
             scene: self.format.has_scenes().then(|| scattered.scene.clone()),
             output: self.output.to_path_buf(),
             unit: scattered.unit.or(self.settings.unit),
