@@ -2,10 +2,11 @@
 
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
 
 use brickmend::io::{ReadOptions, open};
 use brickmend::mesh::{SceneNode, TriangleBatch};
-use brickmend::monitor::Void;
+use brickmend::monitor::{Monitor, Void};
 use brickmend::repair::{
     Depth, HiddenRule, Limits, Outcome, PartsOutcome, PartsRule, RepairError, Settings, Verdict,
     repair_parts,
@@ -200,6 +201,43 @@ fn a_part_becomes_what_it_becomes_alone_whatever_the_limits() {
     let sizes: Vec<_> = found.parts.values().map(|part| (part.0.as_str(), part.2)).collect();
     assert_eq!((sizes[0].0, sizes[1].0), ("drawer", "chest"));
     assert!((sizes[0].1 - 8.0).abs() < 0.01 && (sizes[1].1 - 27.0).abs() < 0.5, "{sizes:?}");
+}
+
+/// Asks to stop when it was asked so often whether to.
+struct StopsAfter(AtomicU64);
+
+impl Monitor for StopsAfter {
+    fn cancelled(&self) -> bool {
+        let left = |left: u64| Some(left.saturating_sub(1));
+        self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, left) == Ok(0)
+    }
+}
+
+#[test]
+fn a_run_that_was_stopped_anywhere_goes_on_to_the_same_bytes() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let input = scene(folder.path());
+    let (settings, limits) = (settings(5), Limits::default());
+    let whole = folder.path().join("whole.glb");
+    separate(&input, &whole, &settings, &limits).expect("repaired");
+    let whole = std::fs::read(&whole).expect("it is there");
+    let output = folder.path().join("out.glb");
+    let mut stopped = 0;
+    for after in [0, 3, 20, 60, 120, 200, 300, 500] {
+        let monitor = StopsAfter(AtomicU64::new(after));
+        let format = brickmend::io::Format::Glb;
+        let ended =
+            repair_parts(&input, &output, format, &settings, &limits, &monitor, &mut |_| {});
+        if let Err(error) = ended {
+            assert!(error.keeps_work(), "{error}");
+            assert!(!output.exists());
+            stopped += 1;
+        }
+    }
+    assert!(stopped >= 3, "{stopped}");
+    separate(&input, &output, &settings, &limits).expect("goes on");
+    assert_eq!(std::fs::read(&output).expect("it is there"), whole);
+    assert!(!folder.path().join("out.glb.brickmend").exists(), "nothing is left of the work");
 }
 
 #[test]

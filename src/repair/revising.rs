@@ -14,9 +14,10 @@ use crate::patch::patch;
 use crate::repair::RepairError;
 use crate::repair::deeper::{DepthTrial, goes_deeper};
 use crate::repair::depth::choose_domain;
-use crate::repair::run::Run;
+use crate::repair::run::{Run, to_text};
 use crate::repair::settings::{Depth, HiddenRule, ThinRule};
 use crate::repair::stages::{Findings, Handles, hand_on, open_bricks};
+use crate::repair::step::Step;
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, scan};
 use crate::sign::{Exposed, FillRule, Flooded, find_exposed, find_lost, flood};
@@ -184,6 +185,8 @@ impl Run<'_> {
         let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
         let thickened = self.thicken(&soup, hits, &scanned, findings, resources)?;
         if let Some(thickened) = &thickened {
+            // No step answers for what is written from here on: a later run begins before it.
+            workspace.go_back_to(Step::Scan, to_text(findings))?;
             soup = thickened.soup(&soup);
             scanned = self.scan_again(&soup, findings, handles, resources)?;
         }

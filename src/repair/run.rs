@@ -465,6 +465,6 @@ impl Run<'_> {
 }
 
 /// Findings as the manifest holds them.
-fn to_text(findings: &Findings) -> String {
+pub(crate) fn to_text(findings: &Findings) -> String {
     serde_json::to_string(findings).expect("plain records serialise")
 }
