@@ -23,6 +23,7 @@ pub mod bridge;
 pub mod catalogue;
 pub mod contour;
 pub mod defect;
+pub mod deviate;
 pub mod diagnose;
 pub mod geom;
 pub mod hidden;

@@ -29,6 +29,10 @@ mod stages;
 mod standing;
 mod step;
 mod surfaces;
+mod thresholds;
+mod verdict;
+mod verification;
+mod verify_file;
 mod workspace;
 
 pub use deeper::DepthTrial;
@@ -48,3 +52,10 @@ pub use outcome::{
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
 pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, Settings, ThinRule};
+pub use thresholds::{
+    Degrees, Measured, NoNumber, Share, Threshold, ThresholdError, VerifySettings,
+};
+pub use verification::{
+    Reason, SurfaceReport, Thresholds, VERIFICATION_VERSION, Verification, VertexNames,
+};
+pub use verify_file::verify_file;
