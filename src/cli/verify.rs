@@ -8,8 +8,8 @@ use std::process::ExitCode;
 use brickmend::deviate::{Deviation, Distances, Separation};
 use brickmend::mesh::LengthUnit;
 use brickmend::repair::{
-    Degrees, Length, Limits, Share, SurfaceReport, Threshold, Verdict, Verification, VertexNames,
-    VerifySettings, verify_file,
+    Degrees, Length, Limits, Share, SurfaceReport, Threshold, Verdict, Verification,
+    VerifySettings, VertexNames, verify_file,
 };
 use clap::Args;
 
@@ -170,7 +170,9 @@ fn report(verification: &Verification) -> String {
         let _ = writeln!(text, "  {}: {}", word(reason.verdict), reason.text);
     }
     if verification.proof.holds() {
-        text.push_str("  proved: closed, manifold, oriented, no degenerate or intersecting triangle");
+        text.push_str(
+            "  proved: closed, manifold, oriented, no degenerate or intersecting triangle",
+        );
         text.push_str(match verification.vertices {
             VertexNames::Numbers => "\n",
             VertexNames::Places => "; vertices by place\n",
@@ -219,7 +221,7 @@ fn write_deviation(text: &mut String, deviation: &Deviation) {
         at(lost.largest.filter(|found| found.distance > deviation.tolerance)),
         percent(deviation.invented_share),
     );
-    let creases = &deviation.creases;
+    let Some(creases) = &deviation.creases else { return };
     match creases.kept_share {
         Some(kept) => {
             let length = short(creases.visible_length);

@@ -5,7 +5,7 @@
 
 use glam::DVec3;
 
-use crate::deviate::creases::CreaseSample;
+use crate::deviate::creases::{CreaseSample, Creases};
 use crate::deviate::deviation::{
     CreaseReport, Deviation, Distances, LostReport, Normals, Separation,
 };
@@ -19,8 +19,9 @@ use crate::store::{Sorter, StoreError, ordered};
 
 /// Samples that a worker takes at a time.
 const CHUNK: usize = 256;
-/// Of so many samples of an area, one of the sharp edges.
-const AREA_PER_CREASE: u64 = 10;
+/// Of so many samples of an area within the tolerance, one is looked at: whether it is seen. Those
+/// beyond all are.
+const WITHIN_PER_LOOK: u64 = 8;
 
 /// Compares a file with its original.
 ///
@@ -34,7 +35,12 @@ pub fn compare(
 ) -> Result<Deviation, StoreError> {
     let there = Tally::measure((original, file), true, options, means)?;
     let back = Tally::measure((file, original), false, options, means)?;
-    let creases = compare_creases(original, file, options, means)?;
+    let creases = match (&original.creases, &file.creases) {
+        (Some(before), Some(now)) => {
+            Some(compare_creases((original, before), (file, now), options, means)?)
+        }
+        _ => None,
+    };
     let [low, high] = original.bounds.map(DVec3::from);
     let share = |part: u64, whole: u64| part as f64 / whole.max(1) as f64;
     Ok(Deviation {
@@ -42,7 +48,7 @@ pub fn compare(
         cell_size: options.cell_size,
         diagonal: low.distance(high),
         lost: LostReport {
-            visible_share: share(there.seen, there.samples),
+            visible_share: share(there.seen, there.samples).min(1.0),
             share: share(there.seen_beyond, there.seen),
             largest: there.largest_seen,
         },
@@ -60,11 +66,7 @@ struct Space<'s> {
 }
 
 impl<'s> Space<'s> {
-    fn new(
-        (own, other): (&'s Surface, &'s Tree),
-        looks: bool,
-        means: &Means<'_>,
-    ) -> Self {
+    fn new((own, other): (&'s Surface, &'s Tree), looks: bool, means: &Means<'_>) -> Self {
         let share_bytes = means.share_bytes / 8 / means.pool.current_num_threads() as u64;
         let sight = looks.then(|| {
             let extent = Curve::new(own.bounds).extent;
@@ -97,6 +99,7 @@ struct Tally {
     angle_count: u64,
     /// Samples farther away than the tolerance.
     beyond: u64,
+    /// Samples that are seen, those within the tolerance by the few that were looked at.
     seen: u64,
     seen_beyond: u64,
     largest_seen: Option<Separation>,
@@ -176,7 +179,7 @@ impl Tally {
         let is_beyond = u64::from(distance > tolerance);
         self.beyond += is_beyond;
         if *is_seen {
-            self.seen += 1;
+            self.seen += if is_beyond == 1 { 1 } else { WITHIN_PER_LOOK };
             self.seen_beyond += is_beyond;
         }
         Ok(())
@@ -213,32 +216,31 @@ fn answer(space: &mut Space<'_>, sample: Sample, tolerance: f64) -> Result<Answe
     let (point, normal) = (DVec3::from(sample.point), DVec3::from(sample.normal));
     let near = space.walker.nearest(point, normal)?;
     let near = near.expect("a surface with an area has a triangle");
-    // What a corner adds to what is seen are distances beyond the tolerance.
-    let is_asked = !sample.is_corner() || near.distance_squared > tolerance * tolerance;
+    let is_asked = near.distance_squared.sqrt() > tolerance || sample.is_one_of(WITHIN_PER_LOOK);
     let is_seen = is_asked && space.sees(point, normal, DVec3::from(sample.inward))?;
     Ok(Answer { sample, near, is_seen })
 }
 
 /// Follows the sharp edges of the original along those of the file.
 fn compare_creases(
-    original: &Surface,
-    file: &Surface,
+    (original, before): (&Surface, &Creases),
+    (file, now): (&Surface, &Creases),
     options: &DeviationOptions,
     means: &Means<'_>,
 ) -> Result<CreaseReport, StoreError> {
     let mut report = CreaseReport {
-        length: original.creases.length,
+        length: before.length,
         visible_length: 0.0,
-        file_length: file.creases.length,
+        file_length: now.length,
         kept_share: None,
         largest: None,
     };
     if report.length == 0.0 {
         return Ok(report);
     }
-    let tree = file.creases.tree(file.bounds, means)?;
-    let count = options.samples.div_ceil(AREA_PER_CREASE);
-    let mut samples = original.creases.samples(original.bounds, count, means)?.finish()?;
+    let tree = now.tree(file.bounds, means)?;
+    let samples = before.samples(original.bounds, options.crease_samples, means)?;
+    let mut samples = samples.finish()?;
     let (mut all, mut seen, mut kept) = (0_u64, 0_u64, 0_u64);
     ordered(
         means.pool,

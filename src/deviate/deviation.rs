@@ -21,8 +21,9 @@ pub struct Deviation {
     pub lost: LostReport,
     /// Share of the file's area that lies farther from the original than the tolerance.
     pub invented_share: f64,
-    /// Sharp edges of the original, and what the file has in their places.
-    pub creases: CreaseReport,
+    /// Sharp edges of the original, and what the file has in their places; `None` where they were not
+    /// sought.
+    pub creases: Option<CreaseReport>,
 }
 
 /// Distances from the samples of one surface to another.

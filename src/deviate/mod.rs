@@ -34,7 +34,7 @@ mod tree;
 pub use compare::compare;
 pub use deviation::{CreaseReport, Deviation, Distances, LostReport, Normals, Separation};
 pub use error::DeviateError;
-pub use surface::Surface;
+pub use surface::{Surface, SurfaceOptions};
 
 use rayon::ThreadPool;
 
@@ -46,17 +46,12 @@ use crate::store::{Scratch, StoreError};
 /// How to measure.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct DeviationOptions {
-    /// Samples of each surface, spread over its area; at most as many of its corners besides.
-    pub samples: u64,
+    /// Samples of sharp edges, where they are sought.
+    pub crease_samples: u64,
     /// What lies farther away than this is lost or invented, model units.
     pub tolerance: f64,
     /// Side of a cell of the grid that the file was made in, where one is known; model units.
     pub cell_size: Option<f64>,
-}
-
-impl DeviationOptions {
-    /// Samples of each surface unless the user says otherwise.
-    pub const DEFAULT_SAMPLES: u64 = 200_000;
 }
 
 /// What a comparison may use.

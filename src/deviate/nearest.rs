@@ -38,12 +38,21 @@ fn cosine_between(one: DVec3, other: DVec3) -> f64 {
     }
 }
 
-/// What `point` with `normal` has nearest on one triangle.
-pub(crate) fn near_on(point: DVec3, normal: DVec3, triangle: &Triangle) -> Near {
+/// What `point` with `normal` has nearest on one triangle; `None` if that is farther than `bound`,
+/// squared.
+#[inline]
+pub(crate) fn near_on(
+    point: DVec3,
+    normal: DVec3,
+    triangle: &Triangle,
+    bound: f64,
+) -> Option<Near> {
     let closest = closest_on_triangle(point, triangle.points());
-    let cosine = cosine_between(normal, triangle.normal());
     let distance_squared = point.distance_squared(closest);
-    Near { distance_squared, point: closest, cosine, triangle: *triangle }
+    (distance_squared <= bound).then(|| {
+        let cosine = cosine_between(normal, triangle.normal());
+        Near { distance_squared, point: closest, cosine, triangle: *triangle }
+    })
 }
 
 /// A walker of one tree; each worker has its own.
@@ -74,18 +83,21 @@ impl<'t> Walker<'t> {
         point: DVec3,
         normal: DVec3,
     ) -> Result<Option<Near>, StoreError> {
-        let mut best = self.last.map(|triangle| near_on(point, normal, &triangle));
+        let guess = |triangle| near_on(point, normal, &triangle, f64::INFINITY);
+        let mut best = self.last.and_then(guess);
+        let farthest = |best: &Option<Near>| best.map_or(f64::INFINITY, |b| b.distance_squared);
         self.start();
         while let Some((bound, level, node)) = self.stack.pop() {
-            if best.is_some_and(|best| bound > best.distance_squared) {
+            if bound > farthest(&best) {
                 continue;
             }
             if level == 0 {
                 for triangle in self.triangles.group(node * GROUP)? {
-                    let near = near_on(point, normal, triangle);
-                    if best.is_none_or(|best| near.goes_before(&best)) {
-                        best = Some(near);
-                    }
+                    let near = near_on(point, normal, triangle, farthest(&best));
+                    best = match (best, near) {
+                        (Some(best), Some(near)) if !near.goes_before(&best) => Some(best),
+                        (best, near) => near.or(best),
+                    };
                 }
                 continue;
             }
@@ -93,7 +105,7 @@ impl<'t> Walker<'t> {
             for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
             {
                 let bound = bounds.distance_squared(point);
-                if best.is_none_or(|best| bound <= best.distance_squared) {
+                if bound <= farthest(&best) {
                     self.stack.push((bound, level - 1, child));
                 }
             }
@@ -121,12 +133,15 @@ impl<'t> Walker<'t> {
                 }
                 continue;
             }
+            let from = self.stack.len();
             for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
             {
-                if bounds.meets(origin, inverse) {
-                    self.stack.push((0.0, level - 1, child));
+                if let Some(enter) = bounds.entered(origin, inverse) {
+                    self.stack.push((enter, level - 1, child));
                 }
             }
+            // What stops the ray is near more often than not.
+            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
         }
         Ok(None)
     }
@@ -143,17 +158,21 @@ impl<'t> Walker<'t> {
 /// Whether a ray meets a triangle, in floating point.
 ///
 /// Source: Moeller and Trumbore 1997, Fast, minimum storage ray-triangle intersection.
+#[inline]
 pub(crate) fn is_met(origin: DVec3, direction: DVec3, triangle: &Triangle) -> bool {
     let [a, b, c] = triangle.points();
     let (ab, ac) = (b - a, c - a);
     let across = direction.cross(ac);
     let determinant = ab.dot(across);
-    if determinant == 0.0 {
+    // All parts are compared with the determinant, whatever its sign.
+    let sign = determinant.signum();
+    let most = determinant.abs();
+    let from = origin - a;
+    let u = from.dot(across) * sign;
+    if most == 0.0 || u < 0.0 || u > most {
         return false;
     }
-    let from = origin - a;
-    let u = from.dot(across) / determinant;
     let up = from.cross(ab);
-    let v = direction.dot(up) / determinant;
-    u >= 0.0 && v >= 0.0 && u + v <= 1.0 && ac.dot(up) / determinant > 0.0
+    let v = direction.dot(up) * sign;
+    v >= 0.0 && u + v <= most && ac.dot(up) * sign > 0.0
 }

@@ -24,11 +24,14 @@ pub(crate) struct Triangle {
 }
 
 impl Triangle {
+    #[inline]
     pub(crate) fn points(&self) -> [DVec3; 3] {
-        self.corners.map(DVec3::from)
+        let [a, b, c] = self.corners;
+        [DVec3::from_array(a), DVec3::from_array(b), DVec3::from_array(c)]
     }
 
     /// Its normal, twice as long as its area is large.
+    #[inline]
     pub(crate) fn normal(&self) -> DVec3 {
         let [a, b, c] = self.points();
         (b - a).cross(c - a)

@@ -37,6 +37,11 @@ impl Sample {
     pub(crate) fn is_corner(&self) -> bool {
         self.corner == 1
     }
+
+    /// Whether this is one of each `count` samples of the area.
+    pub(crate) fn is_one_of(&self, count: u64) -> bool {
+        self.corner == 0 && self.number.is_multiple_of(count)
+    }
 }
 
 impl Record for Sample {

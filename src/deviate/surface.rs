@@ -10,24 +10,35 @@ use crate::deviate::{DeviateError, Means};
 use crate::mesh::MeshSource;
 use crate::store::Sequence;
 
+/// What is asked of a surface.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct SurfaceOptions {
+    /// Samples of its area; at most as many corners are measured besides.
+    pub samples: u64,
+    /// Whether its sharp edges are sought.
+    pub creases: bool,
+    /// Whether triangles lie near those before and after them in the file: then they are not sorted.
+    /// Distances are the same, and found sooner or later.
+    pub is_coherent: bool,
+}
+
 /// A surface that is ready to be compared.
 pub struct Surface {
     pub(crate) bounds: [[f64; 3]; 2],
     pub(crate) tree: Tree,
     pub(crate) samples: Sequence<Sample>,
-    pub(crate) creases: Creases,
+    pub(crate) creases: Option<Creases>,
 }
 
 impl Surface {
-    /// Reads `source` to its end, and takes so many samples of its area and at most as many corners;
-    /// `None` if it has no area, or is so large that squares of its
+    /// Reads `source` to its end; `None` if it has no area, or is so large that squares of its
     /// lengths are no numbers. Triangles with infinite corners are left out.
     ///
     /// # Errors
     /// [`DeviateError`]: the source fails, the scratch disk fails, or the caller cancels.
     pub fn read<S: MeshSource + ?Sized>(
         source: &mut S,
-        samples: u64,
+        options: &SurfaceOptions,
         means: &Means<'_>,
     ) -> Result<Option<Self>, DeviateError<S::Error>> {
         let tape = read(source, means)?;
@@ -35,9 +46,9 @@ impl Surface {
             return Ok(None);
         }
         let bounds = tape.bounds;
-        let samples = take_samples(&tape, samples, means)?;
-        let creases = find_creases(&tape, means)?;
-        let mut builder = TreeBuilder::new(bounds, means);
+        let samples = take_samples(&tape, options.samples, means)?;
+        let creases = options.creases.then(|| find_creases(&tape, means)).transpose()?;
+        let mut builder = TreeBuilder::new(bounds, options.is_coherent, means);
         tape.triangles.each_block(BLOCK, |block| {
             means.stop_if_asked()?;
             block.iter().try_for_each(|triangle| builder.add(*triangle))

@@ -46,17 +46,20 @@ impl Bounds {
     }
 
     /// The square of the distance from a point to the nearest one of the box.
+    #[inline]
     pub(crate) fn distance_squared(&self, point: DVec3) -> f64 {
         let outside = (DVec3::from(self.low) - point).max(point - DVec3::from(self.high));
         outside.max(DVec3::ZERO).length_squared()
     }
 
-    /// Whether a ray meets the box; `inverse` has one over each part of its direction.
-    pub(crate) fn meets(&self, origin: DVec3, inverse: DVec3) -> bool {
+    /// Where a ray enters the box, at 0 if it begins within; `None` if it misses. `inverse` has one
+    /// over each part of its direction.
+    #[inline]
+    pub(crate) fn entered(&self, origin: DVec3, inverse: DVec3) -> Option<f64> {
         let one = (DVec3::from(self.low) - origin) * inverse;
         let other = (DVec3::from(self.high) - origin) * inverse;
-        let (enter, leave) = (one.min(other).max_element(), one.max(other).min_element());
-        enter.max(0.0) <= leave
+        let enter = one.min(other).max_element().max(0.0);
+        (enter <= one.max(other).min_element()).then_some(enter)
     }
 }
 
@@ -103,16 +106,25 @@ impl Record for Placed {
 pub(crate) struct TreeBuilder<'m> {
     means: &'m Means<'m>,
     curve: Curve,
-    sorter: Sorter<Placed>,
+    /// `None` where triangles come in a good order.
+    sorter: Option<Sorter<Placed>>,
+    tree: Tree,
+    /// For each level what the open group of it holds, and how much.
+    open: Vec<(Bounds, u64)>,
 }
 
 impl<'m> TreeBuilder<'m> {
-    pub(crate) fn new(bounds: [[f64; 3]; 2], means: &'m Means<'m>) -> Self {
-        let sorter = Sorter::new(means.scratch, means.share_bytes / 8);
-        Self { means, curve: Curve::new(bounds), sorter }
+    /// No triangles yet, which come `in_order` where neighbours follow each other.
+    pub(crate) fn new(bounds: [[f64; 3]; 2], in_order: bool, means: &'m Means<'m>) -> Self {
+        let sorter = || Sorter::new(means.scratch, means.share_bytes / 8);
+        let triangles = Sequence::new(means.scratch, means.share_bytes / 16);
+        let tree = Tree { triangles, levels: Vec::new() };
+        let sorter = (!in_order).then(sorter);
+        Self { means, curve: Curve::new(bounds), sorter, tree, open: Vec::new() }
     }
 
     pub(crate) fn add(&mut self, triangle: Triangle) -> Result<(), StoreError> {
+        let Some(sorter) = &mut self.sorter else { return self.enter(triangle) };
         let bounds = Bounds::of(&triangle);
         let (low, high) = (DVec3::from(bounds.low), DVec3::from(bounds.high));
         let size = (high - low).max_element();
@@ -120,33 +132,32 @@ impl<'m> TreeBuilder<'m> {
             .find(|&level| size * f64::from(2_u32 << level) > self.curve.extent)
             .unwrap_or(SIZE_LEVELS);
         let key = self.curve.key(low.midpoint(high));
-        self.sorter.push(Placed { key, level, number: triangle.number, triangle })
+        sorter.push(Placed { key, level, number: triangle.number, triangle })
+    }
+
+    /// Puts a triangle behind the others.
+    fn enter(&mut self, triangle: Triangle) -> Result<(), StoreError> {
+        let slack = DVec3::splat(self.curve.extent * SLACK);
+        let mut bounds = Bounds::of(&triangle);
+        bounds.low = (DVec3::from(bounds.low) - slack).into();
+        bounds.high = (DVec3::from(bounds.high) + slack).into();
+        self.tree.triangles.push(triangle)?;
+        self.tree.enter(0, &bounds, &mut self.open, self.means)
     }
 
     /// Puts the boxes around what came.
-    pub(crate) fn finish(self) -> Result<Tree, StoreError> {
-        let Self { means, curve, sorter } = self;
-        let slack = DVec3::splat(curve.extent * SLACK);
-        let mut tree = Tree {
-            triangles: Sequence::new(means.scratch, means.share_bytes / 16),
-            levels: Vec::new(),
-        };
-        let mut open = Vec::new();
-        let mut sorted = sorter.finish()?;
-        let mut count = 0_u64;
-        while let Some(placed) = sorted.next()? {
-            if count.is_multiple_of(1 << 16) {
-                means.stop_if_asked()?;
+    pub(crate) fn finish(mut self) -> Result<Tree, StoreError> {
+        if let Some(sorter) = self.sorter.take() {
+            let mut sorted = sorter.finish()?;
+            while let Some(placed) = sorted.next()? {
+                if self.tree.triangles.len().is_multiple_of(1 << 16) {
+                    self.means.stop_if_asked()?;
+                }
+                self.enter(placed.triangle)?;
             }
-            count += 1;
-            let mut bounds = Bounds::of(&placed.triangle);
-            bounds.low = (DVec3::from(bounds.low) - slack).into();
-            bounds.high = (DVec3::from(bounds.high) + slack).into();
-            tree.triangles.push(placed.triangle)?;
-            tree.enter(0, &bounds, &mut open, means)?;
         }
-        tree.close(open, means)?;
-        Ok(tree)
+        self.tree.close(self.open, self.means)?;
+        Ok(self.tree)
     }
 }
 
@@ -183,11 +194,7 @@ impl Tree {
     }
 
     /// Ends the groups that are not full.
-    fn close(
-        &mut self,
-        mut open: Vec<(Bounds, u64)>,
-        means: &Means<'_>,
-    ) -> Result<(), StoreError> {
+    fn close(&mut self, mut open: Vec<(Bounds, u64)>, means: &Means<'_>) -> Result<(), StoreError> {
         let mut level = 0;
         while level < open.len() {
             let (group, count) = std::mem::replace(&mut open[level], (Bounds::EMPTY, 0));

@@ -18,6 +18,7 @@ mod inspection;
 mod length;
 mod levels;
 mod lock;
+mod measuring;
 mod mending;
 mod outcome;
 mod painting;

@@ -7,6 +7,7 @@ use crate::contour::{
     CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
     write_surface,
 };
+use crate::deviate::Deviation;
 use crate::hidden::HiddenStats;
 use crate::ingest::{
     Bins, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins, read_soup,
@@ -23,6 +24,7 @@ use crate::repair::deeper::DepthTrial;
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
 use crate::repair::length::Ruler;
+use crate::repair::measuring::SAMPLES;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::Run;
 use crate::repair::step::{OUTPUT_PART, Step};
@@ -80,6 +82,9 @@ pub struct Findings {
     pub(crate) lost_maps: Vec<String>,
     pub written: SinkStats,
     pub proof: Option<Proof>,
+    /// How far the written file lies from the soup.
+    #[serde(default)]
+    pub deviation: Option<Deviation>,
     /// The levels before the one under way.
     pub finished: Vec<FinishedLevel>,
 }
@@ -164,6 +169,7 @@ impl Run<'_> {
             Step::Draw => self.draw(workspace, findings, handles, resources)?,
             Step::Write => self.write(workspace, findings, handles, resources)?,
             Step::Prove => self.prove(workspace, findings, resources)?,
+            Step::Measure => self.measure(workspace, findings, resources)?,
         };
         self.recording.end(step.stage());
         Ok(files)
@@ -192,6 +198,10 @@ impl Run<'_> {
             Step::Write => 2 * findings.sign.bricks,
             // Read once, and joined once.
             Step::Prove => 2 * findings.written.triangles,
+            Step::Measure if self.settings.deviation => {
+                findings.soup().stats.triangles + findings.written.triangles + 2 * SAMPLES
+            }
+            Step::Measure => 0,
         }
     }
 

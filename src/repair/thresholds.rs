@@ -6,7 +6,6 @@ use std::str::FromStr;
 
 use serde::{Deserialize, Serialize};
 
-use crate::deviate::DeviationOptions;
 use crate::mesh::LengthUnit;
 use crate::repair::length::Length;
 
@@ -175,7 +174,7 @@ impl Default for VerifySettings {
         Self {
             by_place: false,
             unit: None,
-            samples: DeviationOptions::DEFAULT_SAMPLES,
+            samples: 200_000,
             tolerance: Length::Percent(0.5),
             cell: None,
             max_deviation: Threshold::new(Length::Percent(1.0), Length::Percent(10.0)),

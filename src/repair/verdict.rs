@@ -87,7 +87,8 @@ fn judge_deviation(deviation: &Deviation, thresholds: &Thresholds, reasons: &mut
         )
     };
     if let Some(found) = &deviation.lost.largest {
-        let text = || format!("Visible surface of the original lies up to {} off the file", far(found));
+        let text =
+            || format!("Visible surface of the original lies up to {} off the file", far(found));
         above(&thresholds.max_deviation, found.distance, text, reasons);
     }
     if let Some(found) = &deviation.file_to_original.largest {
@@ -97,9 +98,10 @@ fn judge_deviation(deviation: &Deviation, thresholds: &Thresholds, reasons: &mut
     let tolerance = rounded(deviation.tolerance);
     let lost = deviation.lost.share;
     let text = || {
-        let at = deviation.lost.largest.map_or(String::new(), |found| {
-            format!(", most of all at {}", place(found.position))
-        });
+        let at = deviation
+            .lost
+            .largest
+            .map_or(String::new(), |found| format!(", most of all at {}", place(found.position)));
         format!(
             "{} of what is seen of the original is lost: farther than {tolerance} from the file{at}",
             percent(lost)
@@ -116,11 +118,14 @@ fn judge_deviation(deviation: &Deviation, thresholds: &Thresholds, reasons: &mut
     above(&thresholds.max_invented, invented, text, reasons);
     let [there, back] = [&deviation.original_to_file, &deviation.file_to_original];
     let angle = there.normals.median_deg.max(back.normals.median_deg);
-    let text = || format!("Half of the area has normals that differ by {angle:.1} degrees and more");
+    let text =
+        || format!("Half of the area has normals that differ by {angle:.1} degrees and more");
     above(&thresholds.max_normal_deg, angle, text, reasons);
-    if let Some(kept) = deviation.creases.kept_share {
+    if let Some(creases) = &deviation.creases
+        && let Some(kept) = creases.kept_share
+    {
         let text = || {
-            let at = deviation.creases.largest.map_or(String::new(), |found| {
+            let at = creases.largest.map_or(String::new(), |found| {
                 format!(", for one not at {}", place(found.position))
             });
             format!("{} of the length of visible sharp edges is kept{at}", percent(kept))

@@ -13,7 +13,9 @@ use std::path::Path;
 
 use rayon::{ThreadPool, ThreadPoolBuilder};
 
-use crate::deviate::{DeviateError, Deviation, DeviationOptions, Means, Surface, compare};
+use crate::deviate::{
+    DeviateError, Deviation, DeviationOptions, Means, Surface, SurfaceOptions, compare,
+};
 use crate::ingest::SoupStats;
 use crate::io::{Format, IoError, ReadOptions};
 use crate::mesh::{LengthUnit, TriangleBatch};
@@ -30,6 +32,9 @@ use crate::repair::verification::{
 };
 use crate::store::Scratch;
 use crate::verify::{Outward, Proof, ProofOptions, VerifyError, Vertices, prove};
+
+/// Of so many samples of the area, one of the sharp edges.
+const SAMPLES_PER_CREASE: u64 = 10;
 
 /// Proves the guarantees of the model at `file`, and compares it with the one at `original`.
 ///
@@ -170,7 +175,7 @@ impl Verifying<'_> {
         };
         let thresholds = thresholds(self.settings, &length)?;
         let options = DeviationOptions {
-            samples: self.settings.samples,
+            crease_samples: self.settings.samples.div_ceil(SAMPLES_PER_CREASE),
             tolerance: length(self.settings.tolerance)?,
             cell_size: self.settings.cell.map(length).transpose()?,
         };
@@ -191,7 +196,9 @@ impl Verifying<'_> {
     fn read(&self, path: &Path) -> Result<(Option<Surface>, Option<LengthUnit>), RepairError> {
         self.monitor.begin(Stage::Deviate, 0);
         let mut source = self.open(path).map_err(RepairError::Input)?;
-        let surface = Surface::read(&mut *source, self.settings.samples, &self.means());
+        let samples = self.settings.samples;
+        let options = SurfaceOptions { samples, creases: true, is_coherent: false };
+        let surface = Surface::read(&mut *source, &options, &self.means());
         let surface = surface.map_err(|error| match error {
             DeviateError::Source { source } => RepairError::Input(source),
             DeviateError::Store(error) => RepairError::Store(error),

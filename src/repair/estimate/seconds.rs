@@ -55,9 +55,7 @@ pub fn stages(sums: &SoupSums, counts: &Counts, threads: usize) -> BTreeMap<Stag
         Stage::Sign => PER_CROSSING_SIGNED * crossings + PER_BRICK * bricks,
         Stage::Contour => PER_CROSSING_PLACED * crossings,
         Stage::Verify => PER_TRIANGLE_PROVED * 2.0 * crossings,
-        Stage::Deviate => {
-            PER_TRIANGLE_MEASURED * (2.0 * crossings + sums.stats.triangles as f64)
-        }
+        Stage::Deviate => PER_TRIANGLE_MEASURED * (2.0 * crossings + sums.stats.triangles as f64),
     };
     let with_threads = |(stage, share)| {
         let alone: f64 = 1.0 - share;
