@@ -136,7 +136,7 @@ impl Creases {
         bounds: [[f64; 3]; 2],
         means: &Means<'_>,
     ) -> Result<Tree, StoreError> {
-        let mut builder = TreeBuilder::new(bounds, false, means);
+        let mut builder = TreeBuilder::new(bounds, means);
         let mut number = 0;
         self.list.each_block(BLOCK, |block| {
             for Crease { ends: [from, to], .. } in block {

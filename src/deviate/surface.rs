@@ -48,12 +48,17 @@ impl Surface {
         let bounds = tape.bounds;
         let samples = take_samples(&tape, options.samples, means)?;
         let creases = options.creases.then(|| find_creases(&tape, means)).transpose()?;
-        let mut builder = TreeBuilder::new(bounds, options.is_coherent, means);
-        tape.triangles.each_block(BLOCK, |block| {
-            means.stop_if_asked()?;
-            block.iter().try_for_each(|triangle| builder.add(*triangle))
-        })?;
-        drop(tape);
-        Ok(Some(Self { bounds, tree: builder.finish()?, samples, creases }))
+        let tree = if options.is_coherent {
+            Tree::around(tape.triangles, bounds, means)?
+        } else {
+            let mut builder = TreeBuilder::new(bounds, means);
+            tape.triangles.each_block(BLOCK, |block| {
+                means.stop_if_asked()?;
+                block.iter().try_for_each(|triangle| builder.add(*triangle))
+            })?;
+            drop(tape);
+            builder.finish()?
+        };
+        Ok(Some(Self { bounds, tree, samples, creases }))
     }
 }

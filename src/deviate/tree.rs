@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::Means;
-use crate::deviate::reading::Triangle;
+use crate::deviate::reading::{BLOCK, Triangle};
 use crate::geom::morton;
 use crate::store::{Record, Sequence, Sorter, StoreError};
 
@@ -102,29 +102,22 @@ impl Record for Placed {
     }
 }
 
-/// A tree while triangles come.
+/// A tree while triangles come, which are put in order.
 pub(crate) struct TreeBuilder<'m> {
     means: &'m Means<'m>,
+    bounds: [[f64; 3]; 2],
     curve: Curve,
-    /// `None` where triangles come in a good order.
-    sorter: Option<Sorter<Placed>>,
-    tree: Tree,
-    /// For each level what the open group of it holds, and how much.
-    open: Vec<(Bounds, u64)>,
+    sorter: Sorter<Placed>,
 }
 
 impl<'m> TreeBuilder<'m> {
-    /// No triangles yet, which come `in_order` where neighbours follow each other.
-    pub(crate) fn new(bounds: [[f64; 3]; 2], in_order: bool, means: &'m Means<'m>) -> Self {
-        let sorter = || Sorter::new(means.scratch, means.share_bytes / 8);
-        let triangles = Sequence::new(means.scratch, means.share_bytes / 16);
-        let tree = Tree { triangles, levels: Vec::new() };
-        let sorter = (!in_order).then(sorter);
-        Self { means, curve: Curve::new(bounds), sorter, tree, open: Vec::new() }
+    /// No triangles yet.
+    pub(crate) fn new(bounds: [[f64; 3]; 2], means: &'m Means<'m>) -> Self {
+        let sorter = Sorter::new(means.scratch, means.share_bytes / 8);
+        Self { means, bounds, curve: Curve::new(bounds), sorter }
     }
 
     pub(crate) fn add(&mut self, triangle: Triangle) -> Result<(), StoreError> {
-        let Some(sorter) = &mut self.sorter else { return self.enter(triangle) };
         let bounds = Bounds::of(&triangle);
         let (low, high) = (DVec3::from(bounds.low), DVec3::from(bounds.high));
         let size = (high - low).max_element();
@@ -132,32 +125,22 @@ impl<'m> TreeBuilder<'m> {
             .find(|&level| size * f64::from(2_u32 << level) > self.curve.extent)
             .unwrap_or(SIZE_LEVELS);
         let key = self.curve.key(low.midpoint(high));
-        sorter.push(Placed { key, level, number: triangle.number, triangle })
+        self.sorter.push(Placed { key, level, number: triangle.number, triangle })
     }
 
-    /// Puts a triangle behind the others.
-    fn enter(&mut self, triangle: Triangle) -> Result<(), StoreError> {
-        let slack = DVec3::splat(self.curve.extent * SLACK);
-        let mut bounds = Bounds::of(&triangle);
-        bounds.low = (DVec3::from(bounds.low) - slack).into();
-        bounds.high = (DVec3::from(bounds.high) + slack).into();
-        self.tree.triangles.push(triangle)?;
-        self.tree.enter(0, &bounds, &mut self.open, self.means)
-    }
-
-    /// Puts the boxes around what came.
-    pub(crate) fn finish(mut self) -> Result<Tree, StoreError> {
-        if let Some(sorter) = self.sorter.take() {
-            let mut sorted = sorter.finish()?;
-            while let Some(placed) = sorted.next()? {
-                if self.tree.triangles.len().is_multiple_of(1 << 16) {
-                    self.means.stop_if_asked()?;
-                }
-                self.enter(placed.triangle)?;
+    /// Puts boxes around what came.
+    pub(crate) fn finish(self) -> Result<Tree, StoreError> {
+        let Self { means, bounds, sorter, .. } = self;
+        let mut triangles = Sequence::new(means.scratch, means.share_bytes / 8);
+        let mut sorted = sorter.finish()?;
+        while let Some(placed) = sorted.next()? {
+            if triangles.len().is_multiple_of(1 << 16) {
+                means.stop_if_asked()?;
             }
+            triangles.push(placed.triangle)?;
         }
-        self.tree.close(self.open, self.means)?;
-        Ok(self.tree)
+        drop(sorted);
+        Tree::around(triangles, bounds, means)
     }
 }
 
@@ -169,35 +152,59 @@ pub(crate) struct Tree {
 }
 
 impl Tree {
-    /// Adds something to the open group of a level; `open` has for each level what it holds so far.
-    fn enter(
-        &mut self,
-        level: usize,
-        bounds: &Bounds,
-        open: &mut Vec<(Bounds, u64)>,
+    /// Puts boxes around triangles in the order in which they are.
+    pub(crate) fn around(
+        triangles: Sequence<Triangle>,
+        bounds: [[f64; 3]; 2],
         means: &Means<'_>,
-    ) -> Result<(), StoreError> {
-        if open.len() == level {
-            open.push((Bounds::EMPTY, 0));
-            let share_bytes = means.share_bytes / 64 >> (3 * level).min(63);
-            self.levels.push(Sequence::new(means.scratch, share_bytes));
+    ) -> Result<Self, StoreError> {
+        let slack = DVec3::splat(Curve::new(bounds).extent * SLACK);
+        let mut boxes = Boxes { means, levels: Vec::new(), open: Vec::new() };
+        triangles.each_block(BLOCK, |block| {
+            means.stop_if_asked()?;
+            block.iter().try_for_each(|triangle| {
+                let mut bounds = Bounds::of(triangle);
+                bounds.low = (DVec3::from(bounds.low) - slack).into();
+                bounds.high = (DVec3::from(bounds.high) + slack).into();
+                boxes.enter(0, &bounds)
+            })
+        })?;
+        Ok(Self { triangles, levels: boxes.close()? })
+    }
+}
+
+/// The boxes of a tree while they are made.
+struct Boxes<'m> {
+    means: &'m Means<'m>,
+    levels: Vec<Sequence<Bounds>>,
+    /// For each level what its open group holds, and how much.
+    open: Vec<(Bounds, u64)>,
+}
+
+impl Boxes<'_> {
+    /// Adds something to the open group of a level.
+    fn enter(&mut self, level: usize, bounds: &Bounds) -> Result<(), StoreError> {
+        if self.open.len() == level {
+            self.open.push((Bounds::EMPTY, 0));
+            let share_bytes = self.means.share_bytes / 64 >> (3 * level).min(63);
+            self.levels.push(Sequence::new(self.means.scratch, share_bytes));
         }
-        let (group, count) = &mut open[level];
+        let (group, count) = &mut self.open[level];
         group.add(bounds);
         *count += 1;
         if *count < GROUP {
             return Ok(());
         }
-        let full = std::mem::replace(&mut open[level], (Bounds::EMPTY, 0)).0;
+        let full = std::mem::replace(&mut self.open[level], (Bounds::EMPTY, 0)).0;
         self.levels[level].push(full)?;
-        self.enter(level + 1, &full, open, means)
+        self.enter(level + 1, &full)
     }
 
-    /// Ends the groups that are not full.
-    fn close(&mut self, mut open: Vec<(Bounds, u64)>, means: &Means<'_>) -> Result<(), StoreError> {
+    /// Ends the groups that are not full; all levels up to the one box.
+    fn close(mut self) -> Result<Vec<Sequence<Bounds>>, StoreError> {
         let mut level = 0;
-        while level < open.len() {
-            let (group, count) = std::mem::replace(&mut open[level], (Bounds::EMPTY, 0));
+        while level < self.open.len() {
+            let (group, count) = std::mem::replace(&mut self.open[level], (Bounds::EMPTY, 0));
             if count > 0 {
                 self.levels[level].push(group)?;
             }
@@ -205,11 +212,11 @@ impl Tree {
                 break;
             }
             if count > 0 {
-                self.enter(level + 1, &group, &mut open, means)?;
+                self.enter(level + 1, &group)?;
             }
             level += 1;
         }
         self.levels.truncate(level + 1);
-        Ok(())
+        Ok(self.levels)
     }
 }

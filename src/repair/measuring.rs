@@ -17,8 +17,8 @@ use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
 use crate::store::{FileState, Resources, Spool, SpoolReader, StoreError};
 
-/// Samples of each surface: a thousandth of the area is told within a third of it.
-pub const SAMPLES: u64 = 10_000;
+/// Samples of each surface: a share of a twentieth is told within a hundredth.
+pub const SAMPLES: u64 = 4000;
 /// How far from the input the surface may lie by contouring, cells.
 const CONTOUR_CELLS: f64 = 1.0;
 /// The tolerance is at least so much more, cells: half of a wall of default thickness.

@@ -88,11 +88,10 @@ const UNNUMBERED_TAPE_BYTES: f64 = 200.0;
 /// A triangle in the cells where pairs meet: 24 bytes, more where parcels are small, a fifth of them
 /// in several cells.
 pub const CELL_TRIANGLE_BYTES: f64 = 60.0;
-/// A triangle that is compared: on tape, with its place along a curve, and in a tree with the boxes
-/// around it.
+/// A triangle that is compared: on tape, with its place along a curve, and the boxes around it.
 const MEASURED_BYTES: f64 = 80.0;
 const MEASURED_SORT_BYTES: f64 = 96.0;
-const TREE_BYTES: f64 = 80.0 + 48.0 / 7.0;
+const BOX_BYTES: f64 = 48.0 / 7.0;
 /// Samples and corners of a surface, sorted and in order, and their distances.
 const MEASURED_SAMPLES_BYTES: f64 = 2.0 * SAMPLES as f64 * (2.0 * 112.0 + 16.0);
 /// A vertex under way takes so much of the proof's memory, growth included.
@@ -420,26 +419,23 @@ impl DiskModel<'_> {
             + spilled(added, ORDER_BYTES / BIN_SORT_BYTES, share / 4.0)
     }
 
-    /// What the comparison and the reader of the written file spill: the soup on tape and in order,
-    /// then its tree, while the output is read likewise but for the order.
+    /// What the comparison and the reader of the written file spill: the soup on tape, in order and in
+    /// its tree, the output on tape, which is its tree.
     fn measuring(&self, triangles: f64) -> f64 {
         let share = self.plan.share_bytes as f64 / 4.0 * 3.0;
-        let written = self.counts.at_most.triangles as f64;
+        let most = &self.counts.at_most;
         let read = |count: f64| {
             spilled(MEASURED_BYTES * count, 0.0, share / 8.0)
-                + spilled(TREE_BYTES * count, 0.0, share / 16.0)
+                + spilled(BOX_BYTES * count, 0.0, share / 64.0)
         };
-        let order = spilled(
-            MEASURED_SORT_BYTES * triangles,
-            ORDER_BYTES / MEASURED_SORT_BYTES,
-            share / 8.0,
-        );
+        let order = ORDER_BYTES / MEASURED_SORT_BYTES;
+        let sorted = spilled(MEASURED_SORT_BYTES * triangles, order, share / 8.0);
         let positions = match self.format.has_indices() {
-            true => spilled(POSITION_BYTES * self.counts.at_most.vertices as f64, 0.0, share / 8.0),
+            true => spilled(POSITION_BYTES * most.vertices as f64, 0.0, share / 8.0),
             false => 0.0,
         };
         let samples = 2.0 * spilled(MEASURED_SAMPLES_BYTES, 0.0, share / 16.0);
-        read(triangles) + order + read(written) + positions + samples
+        2.0 * read(triangles) + sorted + read(most.triangles as f64) + positions + samples
     }
 
     /// What the proof and the reader of the written file spill.
