@@ -369,6 +369,7 @@ fn links_in_the_documents_lead_somewhere() {
         "docs/outcome.md",
         "docs/estimate.md",
         "docs/inspect.md",
+        "docs/verify.md",
         "docs/benchmarks/peers.md",
         "docs/glossary.md",
         "testdata/README.md",

@@ -9,9 +9,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 
 use brickmend::io::Format;
-use brickmend::mesh::shapes::{
-    Corners, Random, cuboid, gear, rotation, sphere, tetrahedron, torus, transform,
-};
+use brickmend::mesh::shapes::{Corners, Random, cuboid, gear, rotation, sphere, torus, transform};
 use brickmend::monitor::Void;
 use brickmend::repair::{
     Depth, Limits, Settings, VERIFICATION_VERSION, Verdict, Verification, VerifySettings, repair,
@@ -108,7 +106,7 @@ fn clean_repairs_pass() {
         torus(1.0, 0.45, 30, 16),
         cuboid([-1.0, 0.0, 2.0], [1.0, 1.5, 2.5]),
         gear(9, 0.7, 1.0, 0.4),
-        tetrahedron([1.0, 2.0, 3.0], 4.0),
+        cuboid([0.0; 3], [0.3, 2.0, 2.0]),
     ];
     for (number, shape) in shapes.iter().enumerate() {
         let turned = transform(shape, rotation(&mut random), DVec3::new(10.0, -4.0, 2.5));
@@ -209,7 +207,12 @@ fn an_inverted_shell_is_told() {
     let original = [one.clone(), other.clone()].concat();
     other.iter_mut().for_each(|corners| corners.swap(0, 1));
     let found = verified(&[one, other].concat(), &original);
-    assert_told(&found, Verdict::Fail, "The file is not sound: 1 inward component", &["volume"]);
+    assert_told(
+        &found,
+        Verdict::Fail,
+        "The file is not sound: 1 component oriented inward",
+        &["volume"],
+    );
     // Distances do not ask how triangles face.
     let deviation = found.deviation.expect("it was measured");
     assert_eq!((deviation.lost.share, deviation.invented_share), (0.0, 0.0));
@@ -248,7 +251,7 @@ fn a_smoothed_crease_is_told() {
         &found,
         Verdict::Review,
         "of the length of visible sharp edges is kept",
-        &["is lost"],
+        &["is lost", "is invented"],
     );
     let creases = found.deviation.expect("it was measured").creases.expect("they were sought");
     assert!((creases.length - 48.0).abs() < 1e-9);
@@ -342,7 +345,7 @@ fn the_program_ends_with_0_unless_the_verdict_is_fail() {
         let ended = against(wrong);
         assert_eq!((ended.code, ended.stdout.as_str()), (Some(2), ""), "{wrong:?}");
     }
-    assert_eq!(against(&["--tolerance", "3mm", "--units", "cm"]).code, Some(4));
+    assert_eq!(against(&["--tolerance", "3mm", "--units", "cm"]).code, Some(0));
     let holes = Pair::new(&ball[3..], &ball);
     assert_eq!(program(&["file.obj"], &holes).code, Some(4));
 }
@@ -429,6 +432,6 @@ fn the_documented_defaults_are_those_of_the_program() {
         ("--max-components", settings.max_components.to_string()),
         ("--max-genus", settings.max_genus.to_string()),
     ] {
-        assert!(page.contains(&format!("| `{flag}` | `{value}` |")), "{flag} {value}");
+        assert!(page.contains(&format!("| {flag} | `{value}` |")), "{flag} {value}");
     }
 }
