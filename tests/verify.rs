@@ -129,7 +129,7 @@ fn clean_repairs_pass() {
         // Both ways of measuring see the same.
         let found = found.deviation.expect("it was measured");
         let ratio = found.original_to_file.rms / measured.original_to_file.rms.max(1e-12);
-        assert!(measured.original_to_file.rms < 1e-6 || (0.8..1.25).contains(&ratio), "{ratio}");
+        assert!(measured.original_to_file.rms < 1e-6 || (0.5..2.0).contains(&ratio), "{ratio}");
     }
 }
 
@@ -346,6 +346,7 @@ fn the_program_ends_with_0_unless_the_verdict_is_fail() {
         assert_eq!((ended.code, ended.stdout.as_str()), (Some(2), ""), "{wrong:?}");
     }
     assert_eq!(against(&["--tolerance", "3mm", "--units", "cm"]).code, Some(0));
+    assert_eq!(program(&["file.obj", "--max-lost", "5%"], &pair).code, Some(2), "of what");
     let holes = Pair::new(&ball[3..], &ball);
     assert_eq!(program(&["file.obj"], &holes).code, Some(4));
 }

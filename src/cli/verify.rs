@@ -52,41 +52,52 @@ pub struct VerifyArguments {
 struct MeasureArguments {
     /// Surface that is farther away than this is lost or invented; in model units, with a unit, or
     /// in % of the diagonal of ORIGINAL's bounding box.
-    #[arg(long, value_name = "LENGTH", default_value_t = VerifySettings::default().tolerance)]
+    #[arg(long, requires = "against", value_name = "LENGTH",
+          default_value_t = VerifySettings::default().tolerance)]
     tolerance: Length,
     /// Largest distance, from what is seen of ORIGINAL to FILE, or from FILE to ORIGINAL.
-    #[arg(long, value_name = "LENGTHS", default_value_t = VerifySettings::default().max_deviation)]
+    #[arg(long, requires = "against", value_name = "LENGTHS",
+          default_value_t = VerifySettings::default().max_deviation)]
     max_deviation: Threshold<Length>,
     /// Share of what is seen of ORIGINAL that FILE lacks.
-    #[arg(long, value_name = "PERCENTS", default_value_t = VerifySettings::default().max_lost)]
+    #[arg(long, requires = "against", value_name = "PERCENTS",
+          default_value_t = VerifySettings::default().max_lost)]
     max_lost: Threshold<Share>,
     /// Share of FILE's area that ORIGINAL lacks.
-    #[arg(long, value_name = "PERCENTS", default_value_t = VerifySettings::default().max_invented)]
+    #[arg(long, requires = "against", value_name = "PERCENTS",
+          default_value_t = VerifySettings::default().max_invented)]
     max_invented: Threshold<Share>,
     /// Median angle between normals.
-    #[arg(long, value_name = "DEGREES", default_value_t = VerifySettings::default().max_normal)]
+    #[arg(long, requires = "against", value_name = "DEGREES",
+          default_value_t = VerifySettings::default().max_normal)]
     max_normal: Threshold<Degrees>,
     /// Share of ORIGINAL's visible sharp edges that FILE has, at least.
-    #[arg(long, value_name = "PERCENTS", default_value_t = VerifySettings::default().min_creases)]
+    #[arg(long, requires = "against", value_name = "PERCENTS",
+          default_value_t = VerifySettings::default().min_creases)]
     min_creases: Threshold<Share>,
     /// Difference of volume, where both are sound.
-    #[arg(long, value_name = "PERCENTS", default_value_t = VerifySettings::default().max_volume)]
+    #[arg(long, requires = "against", value_name = "PERCENTS",
+          default_value_t = VerifySettings::default().max_volume)]
     max_volume: Threshold<Share>,
     /// Difference in the number of components, where both are sound.
-    #[arg(long, value_name = "COUNTS", default_value_t = VerifySettings::default().max_components)]
+    #[arg(long, requires = "against", value_name = "COUNTS",
+          default_value_t = VerifySettings::default().max_components)]
     max_components: Threshold<u64>,
     /// Difference of the genus, where both are sound: tunnels filled or new.
-    #[arg(long, value_name = "COUNTS", default_value_t = VerifySettings::default().max_genus)]
+    #[arg(long, requires = "against", value_name = "COUNTS",
+          default_value_t = VerifySettings::default().max_genus)]
     max_genus: Threshold<u64>,
     /// Points that are measured of each surface, and at most as many corners besides.
-    #[arg(long, value_name = "N", default_value_t = VerifySettings::default().samples,
+    #[arg(long, requires = "against", value_name = "N",
+          default_value_t = VerifySettings::default().samples,
           value_parser = clap::value_parser!(u64).range(1..), help_heading = "Measuring")]
     samples: u64,
     /// Tell distances in cells of this size as well.
-    #[arg(long, value_name = "LENGTH", help_heading = "Measuring")]
+    #[arg(long, requires = "against", value_name = "LENGTH", help_heading = "Measuring")]
     cell: Option<Length>,
     /// What a model unit is, for files that do not say so.
-    #[arg(long, value_name = "UNIT", value_parser = parse_unit, help_heading = "Measuring")]
+    #[arg(long, requires = "against", value_name = "UNIT", value_parser = parse_unit,
+          help_heading = "Measuring")]
     units: Option<LengthUnit>,
 }
 
