@@ -60,7 +60,7 @@ fn options(tolerance: f64) -> DeviationOptions {
 /// Triangles of all sizes, some without area.
 fn soup(random: &mut Random, count: usize) -> Vec<Corners> {
     let triangle = |i: usize, random: &mut Random| {
-        let (at, size) = (random.point(), if i % 9 == 0 { 1.0 } else { 0.1 });
+        let (at, size) = (random.point(), if i.is_multiple_of(9) { 1.0 } else { 0.1 });
         let corners: Corners = std::array::from_fn(|_| {
             let by = random.point();
             std::array::from_fn(|axis| at[axis] + size * by[axis])

@@ -186,7 +186,7 @@ impl Boxes<'_> {
     fn enter(&mut self, level: usize, bounds: &Bounds) -> Result<(), StoreError> {
         if self.open.len() == level {
             self.open.push((Bounds::EMPTY, 0));
-            let share_bytes = self.means.share_bytes / 64 >> (3 * level).min(63);
+            let share_bytes = (self.means.share_bytes / 64) >> (3 * level).min(63);
             self.levels.push(Sequence::new(self.means.scratch, share_bytes));
         }
         let (group, count) = &mut self.open[level];
