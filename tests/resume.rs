@@ -1,7 +1,5 @@
 //! A run goes on from any moment at which it was killed, and from no byte that lies.
 
-mod support;
-
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

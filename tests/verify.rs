@@ -1,8 +1,6 @@
 //! Verifications: clean repairs pass, each way to spoil one is told by its own reason, nothing depends
 //! on memory or threads, and `docs/verify.md` names every field.
 
-mod support;
-
 use std::collections::HashMap;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -18,9 +16,9 @@ use brickmend::repair::{
 use glam::DVec3;
 use tempfile::TempDir;
 
-use support::program::Ended;
-use support::schema::check_document;
-use support::testdata;
+use crate::support::program::Ended;
+use crate::support::schema::check_document;
+use crate::support::testdata;
 
 fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")

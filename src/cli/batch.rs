@@ -11,7 +11,7 @@ use brickmend::catalogue::{
     Wanted, run_batch,
 };
 use brickmend::io::Format;
-use brickmend::repair::Blame;
+use brickmend::repair::{Blame, Settings, TextureRule};
 use brickmend::store::StoreError;
 use clap::Args;
 
@@ -139,7 +139,7 @@ fn batch(arguments: &BatchArguments, fleet: &Terminal) -> Result<BatchReport, Ca
     let program = std::env::current_exe()
         .map_err(|source| CatalogueError::Worker { program: PathBuf::new(), source })?;
     let wanted = Wanted {
-        settings: arguments.result.settings(),
+        settings: settings_of(&arguments.result),
         format: arguments.format.map(Format::from),
         only_broken: !arguments.all,
     };
@@ -244,6 +244,15 @@ fn parse_time(text: &str) -> Result<u64, String> {
         _ => return Err(refuse()),
     };
     Ok((number * seconds * 1000.0) as u64)
+}
+
+/// The settings of a batch: its results stand on their own, with copies of their images.
+fn settings_of(arguments: &ResultArguments) -> Settings {
+    let settings = arguments.settings();
+    match arguments.textures {
+        None => Settings { textures: TextureRule::Copy, ..settings },
+        Some(_) => settings,
+    }
 }
 
 #[cfg(test)]

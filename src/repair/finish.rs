@@ -50,6 +50,7 @@ pub fn conclude(
     Outcome {
         schema: SCHEMA_VERSION,
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        part: None,
         verdict,
         reasons,
         input: SoupReport {

@@ -8,7 +8,7 @@ use crate::deviate::{
     DeviateError, Deviation, DeviationOptions, Means, Surface, SurfaceOptions, compare,
 };
 use crate::ingest::SOUP;
-use crate::io::ReadOptions;
+use crate::io::{Format, ReadOptions};
 use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
 use crate::octree::{SoupTriangle, TRANSPARENT};
 use crate::repair::RepairError;
@@ -60,7 +60,12 @@ impl Run<'_> {
         let before = before.map_err(|error| match error {
             DeviateError::Source { source } | DeviateError::Store(source) => source,
         })?;
-        let options = ReadOptions { share_bytes: resources.share_bytes / 4 };
+        let share_bytes = resources.share_bytes / 4;
+        let options = match self.format {
+            // As it is proved: numbers as they were written.
+            Format::Glb => ReadOptions::by_itself(share_bytes),
+            _ => ReadOptions::in_scene(share_bytes),
+        };
         let file = crate::io::open(workspace.part(), scratch, &options);
         let mut file = file.map_err(RepairError::ReadBack)?;
         let after = Surface::read(&mut *file, &asked, &means).map_err(|error| match error {

@@ -22,6 +22,7 @@ mod measuring;
 mod mending;
 mod outcome;
 mod painting;
+mod parts;
 mod plan;
 mod revising;
 mod run;
@@ -50,9 +51,12 @@ pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
+pub use parts::{LeftOut, PartReport, PartsOutcome, repair_parts};
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, Settings, ThinRule};
+pub use settings::{
+    Depth, HiddenRule, Limits, MaxHole, NormalRule, PartsRule, Settings, TextureRule, ThinRule,
+};
 pub use thresholds::{
     Degrees, Measured, NoNumber, Share, Threshold, ThresholdError, VerifySettings,
 };

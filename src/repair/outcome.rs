@@ -14,6 +14,7 @@ use crate::mesh::Attributes;
 use crate::monitor::{Counter, Gauge, Stage};
 use crate::octree::{Domain, SnapBox};
 use crate::patch::{Opening, PatchStats};
+use crate::repair::parts::PartReport;
 use crate::repair::settings::Settings;
 use crate::scan::ScanStats;
 use crate::sign::{SignStats, VoteStats};
@@ -24,7 +25,7 @@ use crate::verify::Proof;
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// How good the result is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing to look at.
@@ -179,6 +180,9 @@ pub struct Outcome {
     pub schema: u32,
     /// Version of the program.
     pub version: String,
+    /// Which part of the model this is of, with `--parts separate`.
+    #[serde(default)]
+    pub part: Option<PartReport>,
     /// How good the result is.
     pub verdict: Verdict,
     /// What a person should look at.

@@ -116,7 +116,7 @@ struct Beside {
 
 impl Verifying<'_> {
     fn open(&self, path: &Path) -> Result<crate::io::Source, IoError> {
-        crate::io::open(path, &self.scratch, &ReadOptions { share_bytes: self.share_bytes / 4 })
+        crate::io::open(path, &self.scratch, &ReadOptions::in_scene(self.share_bytes / 4))
     }
 
     /// What tells vertices of a file apart: formats that list a vertex once for each attribute of its

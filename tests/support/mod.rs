@@ -1,7 +1,5 @@
 //! What the tests of whole repairs share: soups, ways to break them, files, and judgement.
 
-#![allow(dead_code, reason = "each test file uses its own part")]
-
 pub mod breakage;
 pub mod disk_watch;
 pub mod image;
