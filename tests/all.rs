@@ -31,4 +31,5 @@ mod sheets;
 mod thin;
 mod tidy;
 mod units;
+mod verify;
 mod winding;

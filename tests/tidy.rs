@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Modules of the library by layer; a module imports from strictly lower layers only.
-const LAYERS: [(&str, u32); 21] = [
+const LAYERS: [(&str, u32); 22] = [
     ("monitor", 0),
     ("geom", 1),
     ("mesh", 2),
@@ -25,6 +25,7 @@ const LAYERS: [(&str, u32); 21] = [
     ("paint", STAGE),
     ("verify", STAGE),
     ("diagnose", STAGE),
+    ("deviate", STAGE),
     ("repair", 5),
     ("catalogue", 6),
     ("report", 6),
@@ -385,6 +386,7 @@ fn links_in_the_documents_lead_somewhere() {
         "docs/outcome.md",
         "docs/estimate.md",
         "docs/inspect.md",
+        "docs/verify.md",
         "docs/journal.md",
         "docs/parts.md",
         "docs/benchmarks/peers.md",

@@ -88,6 +88,9 @@ pub struct ResultArguments {
     /// PLY, 3MF and GLB.
     #[arg(long)]
     tag_patches: bool,
+    /// Do not measure how far the output lies from the input.
+    #[arg(long)]
+    no_deviation: bool,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
     #[arg(long)]
     strict: bool,
@@ -286,6 +289,7 @@ impl ResultArguments {
             textures,
             normals,
             tag_patches: self.tag_patches,
+            deviation: !self.no_deviation,
             strict,
         }
     }

@@ -9,11 +9,13 @@ mod fleet;
 mod inspect;
 mod last_words;
 mod memory;
+mod numbers;
 mod progress;
 mod repair;
 mod signals;
 mod stage_clock;
 mod status;
+mod verify;
 mod worker;
 
 use clap::{Parser, Subcommand};
@@ -41,6 +43,8 @@ enum Command {
     Repair(repair::RepairArguments),
     /// Tell what is wrong with models; changes nothing.
     Inspect(inspect::InspectArguments),
+    /// Prove that a model is sound, and measure how far it lies from an original.
+    Verify(verify::VerifyArguments),
     /// Repair a folder of models, as far as that is not done.
     Batch(batch::BatchArguments),
     /// Tell where a folder of results stands.
@@ -61,6 +65,7 @@ pub fn run() -> std::process::ExitCode {
     match arguments.command {
         Command::Repair(arguments) => repair::run(&arguments, &chatter),
         Command::Inspect(arguments) => inspect::run(&arguments, &chatter),
+        Command::Verify(arguments) => verify::run(&arguments, &chatter),
         Command::Batch(arguments) => batch::run(&arguments, &chatter),
         Command::Status(arguments) => status::run(&arguments, &chatter),
         Command::Worker(arguments) => worker::run(&arguments, &chatter),

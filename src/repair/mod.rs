@@ -18,6 +18,7 @@ mod inspection;
 mod length;
 mod levels;
 mod lock;
+mod measuring;
 mod mending;
 mod outcome;
 mod painting;
@@ -30,6 +31,10 @@ mod stages;
 mod standing;
 mod step;
 mod surfaces;
+mod thresholds;
+mod verdict;
+mod verification;
+mod verify_file;
 mod workspace;
 
 pub use deeper::DepthTrial;
@@ -52,3 +57,10 @@ pub use run::{repair, repair_levels};
 pub use settings::{
     Depth, HiddenRule, Limits, MaxHole, NormalRule, PartsRule, Settings, TextureRule, ThinRule,
 };
+pub use thresholds::{
+    Degrees, Measured, NoNumber, Share, Threshold, ThresholdError, VerifySettings,
+};
+pub use verification::{
+    Reason, SurfaceReport, Thresholds, VERIFICATION_VERSION, Verification, VertexNames,
+};
+pub use verify_file::verify_file;

@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::bridge::{MendStats, ThickenStats};
 use crate::contour::{ContourStats, SurfaceDetail};
+use crate::deviate::Deviation;
 use crate::hidden::HiddenStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
 use crate::mesh::Attributes;
@@ -204,6 +205,9 @@ pub struct Outcome {
     pub dropped: Dropped,
     /// The output.
     pub output: OutputReport,
+    /// How far the output lies from the input; `None` if that was not wanted, or the input is too
+    /// large for squares of its lengths.
+    pub deviation: Option<Deviation>,
     /// Counts of mending: walls and fills.
     pub mend: MendStats,
     /// Counts of what was thickened.

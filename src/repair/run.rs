@@ -324,7 +324,7 @@ impl Run<'_> {
         let mut handles = Handles::default();
         loop {
             if !workspace.is_in_place() {
-                let last = Step::Prove;
+                let last = Step::Measure;
                 self.steps(workspace, pool, &mut findings, &mut handles, last)?;
                 self.put_beside(workspace, &findings)?;
                 workspace.put_in_place()?;

@@ -172,6 +172,8 @@ pub struct Settings {
     pub normals: NormalRule,
     /// Whether what closes openings is told apart in the output, where its format can.
     pub tag_patches: bool,
+    /// Whether the output is compared with the input at the end.
+    pub deviation: bool,
     /// Refuse broken faces in place of dropping them.
     pub strict: bool,
 }
@@ -197,6 +199,7 @@ impl Default for Settings {
             textures: TextureRule::Refer,
             normals: NormalRule::Keep,
             tag_patches: false,
+            deviation: true,
             strict: false,
         }
     }

@@ -10,6 +10,7 @@ use crate::contour::{
     CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
     write_surface,
 };
+use crate::deviate::Deviation;
 use crate::hidden::HiddenStats;
 use crate::ingest::{
     Bins, Converted, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins,
@@ -26,6 +27,7 @@ use crate::repair::deeper::DepthTrial;
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
 use crate::repair::length::Ruler;
+use crate::repair::measuring::SAMPLES;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::{Feed, Run};
 use crate::repair::settings::Settings;
@@ -84,6 +86,9 @@ pub struct Findings {
     pub(crate) lost_maps: Vec<String>,
     pub written: SinkStats,
     pub proof: Option<Proof>,
+    /// How far the written file lies from the soup.
+    #[serde(default)]
+    pub deviation: Option<Deviation>,
     /// The levels before the one under way.
     pub finished: Vec<FinishedLevel>,
 }
@@ -168,6 +173,7 @@ impl Run<'_> {
             Step::Draw => self.draw(workspace, findings, handles, resources)?,
             Step::Write => self.write(workspace, findings, handles, resources)?,
             Step::Prove => self.prove(workspace, findings, resources)?,
+            Step::Measure => self.measure(workspace, findings, resources)?,
         };
         self.recording.end(step.stage());
         Ok(files)
@@ -196,6 +202,10 @@ impl Run<'_> {
             Step::Write => 2 * findings.sign.bricks,
             // Read once, and joined once.
             Step::Prove => 2 * findings.written.triangles,
+            Step::Measure if self.settings.deviation => {
+                findings.soup().stats.triangles + findings.written.triangles + 2 * SAMPLES
+            }
+            Step::Measure => 0,
         }
     }
 
