@@ -135,6 +135,8 @@ fn nodes_names_and_what_is_shared_survive_and_what_nobody_sees_goes() {
             outcomes.iter().map(|o| o.part.as_ref().expect("a part").name.clone()).collect();
         assert_eq!(names, ["pyramid", "box"]);
         assert!(outcomes.iter().all(|outcome| outcome.output.proof.failures().is_empty()));
+        let lost = |outcome: &Outcome| outcome.deviation.as_ref().expect("measured").lost.share;
+        assert!(outcomes.iter().all(|outcome| lost(outcome) < 0.01), "{name}");
         let after = read(&output);
         let volumes: Vec<_> = after.parts.values().map(|part| part.2).collect();
         assert!((volumes[0] - 8.0 / 3.0).abs() < 0.02, "{volumes:?}");

@@ -8,7 +8,7 @@ use crate::deviate::{
     DeviateError, Deviation, DeviationOptions, Means, Surface, SurfaceOptions, compare,
 };
 use crate::ingest::SOUP;
-use crate::io::{Format, ReadOptions};
+use crate::io::{Format, IoError, ReadOptions};
 use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
 use crate::octree::{SoupTriangle, TRANSPARENT};
 use crate::repair::RepairError;
@@ -38,13 +38,23 @@ impl Run<'_> {
     ) -> Result<Vec<FileState>, RepairError> {
         findings.deviation = None;
         if self.settings.deviation {
-            findings.deviation = self.deviation(workspace, findings, resources)?;
+            let share_bytes = resources.share_bytes / 4;
+            let options = match self.format {
+                // As it is proved: numbers as they were written.
+                Format::Glb => ReadOptions::by_itself(share_bytes),
+                _ => ReadOptions::in_scene(share_bytes),
+            };
+            let file = crate::io::open(workspace.part(), resources.scratch, &options);
+            let mut file = file.map_err(RepairError::ReadBack)?;
+            findings.deviation = self.deviation(&mut *file, workspace, findings, resources)?;
         }
         Ok(Vec::new())
     }
 
-    fn deviation(
+    /// Measures what `file` gives: the written file, or what it has of a part.
+    pub(crate) fn deviation<S: MeshSource<Error = IoError> + ?Sized>(
         &self,
+        file: &mut S,
         workspace: &Workspace,
         findings: &Findings,
         resources: &Resources,
@@ -60,19 +70,10 @@ impl Run<'_> {
         let before = before.map_err(|error| match error {
             DeviateError::Source { source } | DeviateError::Store(source) => source,
         })?;
-        let share_bytes = resources.share_bytes / 4;
-        let options = match self.format {
-            // As it is proved: numbers as they were written.
-            Format::Glb => ReadOptions::by_itself(share_bytes),
-            _ => ReadOptions::in_scene(share_bytes),
-        };
-        let file = crate::io::open(workspace.part(), scratch, &options);
-        let mut file = file.map_err(RepairError::ReadBack)?;
-        let after = Surface::read(&mut *file, &asked, &means).map_err(|error| match error {
+        let after = Surface::read(file, &asked, &means).map_err(|error| match error {
             DeviateError::Source { source } => RepairError::ReadBack(source),
             DeviateError::Store(source) => RepairError::Store(source),
         })?;
-        drop(file);
         let Some((before, after)) = before.zip(after) else { return Ok(None) };
         let options = self.deviation_options(findings);
         Ok(Some(compare(&before, &after, &options, &means)?))

@@ -414,9 +414,10 @@ impl Assembly<'_> {
             true => ReadOptions::by_itself(share_bytes),
             false => ReadOptions::in_scene(share_bytes),
         };
-        let mut slices = Slices::new(|| -> Result<Source, IoError> {
-            crate::io::open(&part, &scratch, &options)
-        });
+        let open_file =
+            || -> Result<Source, IoError> { crate::io::open(&part, &scratch, &options) };
+        // Each goes through the file once.
+        let (mut proved, mut measured) = (Slices::new(open_file), Slices::new(open_file));
         let mut concluded = TextsWriter::create(resources.scratch, CONCLUDED)?;
         let mut texts = Texts::new(found);
         while let Some(text) = texts.next()? {
@@ -431,9 +432,16 @@ impl Assembly<'_> {
             let triangles = after.triangles - before.triangles;
             self.recording.begin(Stage::Verify, 2 * triangles);
             let mut open =
-                || slices.part(before, after).map(|part| Box::new(part) as ProvedSource<'_, _>);
+                || proved.part(before, after).map(|part| Box::new(part) as ProvedSource<'_, _>);
             run.prove_source(&mut open, self.workspace, &mut findings, resources)?;
             self.recording.end(Stage::Verify);
+            if self.settings.deviation {
+                self.recording.begin(Stage::Deviate, triangles);
+                let mut file = measured.part(before, after).map_err(RepairError::ReadBack)?;
+                let inner = Resources { scratch: workspace.scratch(), ..*resources };
+                findings.deviation = run.deviation(&mut file, &workspace, &findings, &inner)?;
+                self.recording.end(Stage::Deviate);
+            }
             findings.written.vertices = after.vertices - before.vertices;
             findings.written.triangles = triangles;
             findings.written.file = *file;
