@@ -4,7 +4,7 @@
 //! octree depth, inside the memory that the caller granted.
 //!
 //! ```text
-//! file -> ingest -> scan -> patch -> sign -> contour -> verify -> file
+//! file -> ingest -> scan -> patch -> sign -> contour -> verify -> deviate -> file
 //!           |        |        |       |        |
 //!          bins    bricks   flips   signs    cells      (all on disk, in the work folder)
 //! ```
@@ -23,6 +23,7 @@ pub mod bridge;
 pub mod catalogue;
 pub mod contour;
 pub mod defect;
+pub mod deviate;
 pub mod diagnose;
 pub mod geom;
 pub mod hidden;

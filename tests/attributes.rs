@@ -1,18 +1,19 @@
 //! Texture coordinates, colours and normals reach the output: without smears, split where seams and
 //! creases were and nowhere else.
 
-mod support;
-
 use std::collections::HashMap;
 use std::f64::consts::TAU;
 use std::fmt::Write;
 use std::path::Path;
 
-use brickmend::io::{ReadOptions, open};
+use brickmend::io::{Format, ReadOptions, open};
 use brickmend::mesh::TriangleBatch;
 use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, sphere};
 use brickmend::monitor::Void;
-use brickmend::repair::{Limits, NormalRule, Outcome, Reach, Settings, repair_levels};
+use brickmend::repair::{
+    Limits, NormalRule, Outcome, Reach, Settings, TextureRule, repair as repair_model,
+    repair_levels,
+};
 use brickmend::sign::FillRule;
 use brickmend::store::Scratch;
 use glam::{DMat3, DVec2, DVec3};
@@ -41,7 +42,7 @@ fn text_of(workshop: &Workshop, triangles: &[Textured]) -> String {
 /// What our own reader finds in a file.
 fn read(path: &Path) -> TriangleBatch {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     let mut source = open(path, &Scratch::new(folder.path()), &options).expect("opens");
     let (mut batch, mut all) = (TriangleBatch::default(), TriangleBatch::default());
     while source.next_batch(&mut batch).expect("reads") {
@@ -62,6 +63,9 @@ fn repair(
     let repaired =
         workshop.repair(&input, extension, settings, &Limits::default()).expect("a result");
     Surface::read_proven(&repaired.path, FillRule::Solid);
+    let mut work_folder = repaired.path.clone().into_os_string();
+    work_folder.push(".brickmend");
+    assert!(!Path::new(&work_folder).exists(), "nothing is left of the work");
     let found = read(&repaired.path);
     assert_eq!(found.uvs.len(), found.corners.len(), "every triangle has coordinates");
     let uvs = found.uvs.iter().map(|uvs| uvs.map(|uv| uv.map(f64::from)));
@@ -372,7 +376,7 @@ fn a_vertex_of_glb_is_split_at_seams_and_creases_only() {
     let settings = Settings { normals: NormalRule::Smooth, ..unclustered(5) };
     let repaired = workshop.repair(&input, "glb", &settings, &Limits::default()).expect("a result");
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     let mut source = open(&repaired.path, &Scratch::new(folder.path()), &options).expect("opens");
     let mut uses: HashMap<[u64; 3], Vec<u32>> = HashMap::new();
     let mut batch = TriangleBatch::default();
@@ -503,6 +507,33 @@ fn without_attributes_nothing_is_drawn_twice() {
 }
 
 #[test]
+fn images_come_along_on_request() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let (inputs, results) = (folder.path().join("inputs"), folder.path().join("results"));
+    for folder in [&inputs, &results] {
+        std::fs::create_dir(folder).expect("a folder");
+    }
+    let (triangles, _) = cube(DMat3::IDENTITY);
+    let workshop = Workshop::new();
+    let model = text_of(&workshop, &triangles).replacen("mtllib ", "mtllib cube.mtl\n#", 1);
+    std::fs::write(inputs.join("cube.obj"), model).expect("written");
+    std::fs::write(inputs.join("cube.mtl"), "newmtl skin\nmap_Kd oak.png\n").expect("written");
+    let image = b"\x89PNG\r\n\x1a\n and what follows";
+    std::fs::write(inputs.join("oak.png"), image).expect("written");
+    for textures in [TextureRule::Refer, TextureRule::Copy] {
+        let settings = Settings { textures, ..at_depth(5) };
+        let output = results.join(format!("{textures:?}.obj"));
+        let (input, limits) = (inputs.join("cube.obj"), Limits::default());
+        repair_model(&input, &output, Format::Obj, &settings, &limits, &Void).expect("a result");
+        let library = std::fs::read_to_string(output.with_extension("mtl")).expect("a library");
+        let way = library.lines().find_map(|line| line.strip_prefix("map_Kd ")).expect("an image");
+        let is_copied = textures == TextureRule::Copy;
+        assert_eq!(way.starts_with("../inputs/"), !is_copied, "{way}");
+        assert_eq!(std::fs::read(results.join(way)).expect("it is there"), image);
+    }
+}
+
+#[test]
 fn images_folded_along_an_edge_part_looks_there() {
     // Both halves of the upper side show the same half of the image.
     let fold = 0.43;
@@ -544,7 +575,7 @@ fn levels_have_the_attributes_that_a_run_for_each_gives() {
     let settings = Settings { normals: NormalRule::Smooth, ..at_depth(6) };
     let output = input.with_file_name("levels.glb");
     let limits = Limits::default();
-    let format = brickmend::io::Format::Glb;
+    let format = Format::Glb;
     let outcomes =
         repair_levels(&input, &output, format, &settings, &levels, &limits, &Void).expect("files");
     for (outcome, decimate) in outcomes.iter().zip(levels) {

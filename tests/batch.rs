@@ -6,10 +6,9 @@ use std::time::Duration;
 use brickmend::mesh::shapes::cuboid;
 use rustix::process::{Pid, Signal, kill_process};
 
-#[path = "support/library.rs"]
-mod library;
-
-use library::{Library, SOUND, children_of, files_in, kill, obj_of, slow_library, start_slowly};
+use crate::support::library::{
+    Library, SOUND, children_of, files_in, kill, obj_of, slow_library, start_slowly,
+};
 
 fn count(summary: &serde_json::Value, state: &str) -> u64 {
     let states = summary["states"].as_array().expect("a list");

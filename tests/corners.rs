@@ -1,7 +1,5 @@
 //! Corners and creases of sharp solids in any position, before and after clustering.
 
-mod support;
-
 use brickmend::mesh::shapes::{Corners, Random, cuboid, gear, rotation, transform};
 use brickmend::repair::{Reach, Settings};
 use glam::DVec3;

@@ -1,7 +1,5 @@
 //! What a night brings: kills, calls that fail, memory and disk that run out, signals, two runs.
 
-mod support;
-
 use std::io::{BufRead, BufReader};
 use std::process::{Child, ChildStderr, Stdio};
 

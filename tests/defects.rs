@@ -3,15 +3,13 @@
 //! The cases lie in `testdata/defects/<name>/`; the second line of `about.txt` says what is
 //! expected. The cases of overlapping and abutting boxes are rotated here as well.
 
-mod support;
-
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use brickmend::repair::{Outcome, RepairError};
 use brickmend::sign::FillRule;
 
-use support::{repair_at, testdata};
+use crate::support::{repair_at, testdata};
 
 const DEPTH: u32 = 6;
 

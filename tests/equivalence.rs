@@ -1,7 +1,5 @@
 //! Twins: the same bytes come out whatever the threads, the memory, the share and the backing.
 
-mod support;
-
 use brickmend::mesh::shapes::{Corners, Random, sphere};
 use brickmend::repair::{Limits, Settings};
 use brickmend::store::Backing;

@@ -1,7 +1,5 @@
 //! Estimates against what repairs took, and `docs/estimate.md` against what an estimate tells.
 
-mod support;
-
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -16,11 +14,11 @@ use brickmend::repair::{
 };
 use tempfile::NamedTempFile;
 
-use support::disk_watch::DiskWatch;
-use support::run::{Encoding, Workshop, at_depth, unclustered};
-use support::schema::check_document;
-use support::soups::closed_soups;
-use support::testdata;
+use crate::support::disk_watch::DiskWatch;
+use crate::support::run::{Encoding, Workshop, at_depth, unclustered};
+use crate::support::schema::check_document;
+use crate::support::soups::closed_soups;
+use crate::support::testdata;
 
 const MODELS: [&str; 6] = [
     "models/bowl.obj",

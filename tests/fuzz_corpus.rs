@@ -1,7 +1,5 @@
 //! Replays what the fuzzers found worth keeping, and mutates it.
 
-mod support;
-
 use std::path::PathBuf;
 
 use brickmend::mesh::shapes::Random;

@@ -1,7 +1,5 @@
 //! The promises, held against soups of all kinds.
 
-mod support;
-
 use brickmend::mesh::shapes::{Corners, Random, area, shuffle, sphere, volume};
 use brickmend::repair::RepairError;
 use brickmend::sign::FillRule;

@@ -1,7 +1,5 @@
 //! Parts that nobody sees: left out, named; kept where they are seen, or on demand.
 
-mod support;
-
 use std::fmt::Write;
 use std::path::PathBuf;
 

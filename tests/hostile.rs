@@ -1,7 +1,5 @@
 //! Input that lies, through the command line: a clear refusal or a repair, and nothing left over.
 
-mod support;
-
 use std::ffi::{OsStr, OsString};
 use std::io::Write;
 use std::os::unix::ffi::OsStrExt;

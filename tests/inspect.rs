@@ -1,8 +1,6 @@
 //! Inspections: each injected defect is found, clean shapes are sound, nothing depends on memory or
 //! threads, and `docs/inspect.md` names every field.
 
-mod support;
-
 use std::collections::BTreeSet;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
@@ -17,10 +15,10 @@ use brickmend::repair::{INSPECTION_VERSION, InspectSettings, Inspection, Limits,
 use glam::DVec3;
 use tempfile::TempDir;
 
-use support::breakage::Breakage;
-use support::program::Ended;
-use support::schema::check_document;
-use support::testdata;
+use crate::support::breakage::Breakage;
+use crate::support::program::Ended;
+use crate::support::schema::check_document;
+use crate::support::testdata;
 
 fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")

@@ -1,7 +1,5 @@
 //! Thresholds of decimation: one file for each from one run, and the one that gives few triangles.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};

@@ -1,7 +1,5 @@
 //! Materials reach the output: with the area that they had, along the borders that they had.
 
-mod support;
-
 use std::collections::BTreeMap;
 use std::fmt::Write;
 use std::path::Path;
@@ -75,7 +73,7 @@ fn text_of(library: &Path, parts: &[(&str, &[Corners])]) -> String {
 /// What our own reader finds in a file.
 fn read(path: &Path) -> Painted {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     let mut source = open(path, &Scratch::new(folder.path()), &options).expect("opens");
     let mut batch = TriangleBatch::default();
     let mut painted = Painted::new();
@@ -151,7 +149,7 @@ fn borders_around_a_ball_stay_where_they_were() {
 
 #[test]
 fn without_clusters_borders_stay_as_well() {
-    let settings = support::run::unclustered(6);
+    let settings = crate::support::run::unclustered(6);
     assert_painted_alike(&cuboid([0.0; 3], [1.0; 3]), "cube", &settings);
 }
 

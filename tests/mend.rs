@@ -1,7 +1,5 @@
 //! Openings: which are filled, which are wanted, and the walls that come of those.
 
-mod support;
-
 use brickmend::mesh::shapes::{
     Corners, Random, cuboid, rotation, shuffle, sphere, torus, transform, volume,
 };

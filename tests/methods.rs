@@ -1,7 +1,5 @@
 //! Methods other than the default: what they keep all the same, and what they do not.
 
-mod support;
-
 use brickmend::contour::Method;
 use brickmend::mesh::shapes::{Random, cuboid};
 use brickmend::repair::{RepairError, Settings, Verdict};

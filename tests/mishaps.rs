@@ -8,16 +8,15 @@ use std::time::{Duration, Instant};
 use brickmend::mesh::shapes::torus;
 use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
 
-#[path = "support/library.rs"]
-mod library;
+use crate::support::library::{Library, children_of, files_in, obj_of, slow_library, start_slowly};
 
-use library::{Library, children_of, files_in, obj_of, slow_library, start_slowly};
-
-/// The worker of a batch that has one.
+/// The worker of a batch that has one, once it is bound to its parent and listens to signals.
 fn worker_of(batch: &mut Child) -> Pid {
     let begun = Instant::now();
     while begun.elapsed() < Duration::from_secs(30) {
-        if let [worker, ..] = children_of(batch.id())[..] {
+        if let [worker, ..] = children_of(batch.id())[..]
+            && listens(worker)
+        {
             return worker;
         }
         assert!(
@@ -26,6 +25,15 @@ fn worker_of(batch: &mut Child) -> Pid {
         );
     }
     panic!("no worker was started")
+}
+
+/// Whether a process catches SIGTERM.
+fn listens(process: Pid) -> bool {
+    let status = std::fs::read_to_string(format!("/proc/{}/status", process.as_raw_pid()));
+    let status = status.unwrap_or_default();
+    let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
+    let mask = mask.and_then(|mask| u64::from_str_radix(mask.trim(), 16).ok()).unwrap_or(0);
+    mask & (1 << (Signal::TERM.as_raw() - 1)) != 0
 }
 
 fn send(batch: &Child, signal: Signal) {

@@ -1,7 +1,5 @@
 //! Every model below the folder that `BRICKMEND_MODELS` names; nothing without it.
 
-mod support;
-
 use std::path::{Path, PathBuf};
 
 use brickmend::io::{IoError, detect};

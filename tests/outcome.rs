@@ -1,16 +1,17 @@
 //! `docs/outcome.md` names every field of the outcome, and no other.
 
-mod support;
-
 use brickmend::monitor::Stage;
 use brickmend::repair::{SCHEMA_VERSION, StageReport};
 use brickmend::sign::FillRule;
 
-use support::schema::check_document;
-use support::{repair_at, testdata};
+use crate::support::schema::check_document;
+use crate::support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 49] = [
+const CONDITIONAL: [&str; 52] = [
+    "part.number",
+    "part.name",
+    "part.places",
     "hidden.largest[]",
     "hidden.largest[].part",
     "hidden.largest[].part_number",

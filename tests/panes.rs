@@ -1,7 +1,5 @@
 //! Panes neither seal nor hide: an oven behind its glass stays an oven.
 
-mod support;
-
 use std::fmt::Write;
 use std::path::PathBuf;
 

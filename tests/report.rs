@@ -9,10 +9,7 @@ use std::process::Command;
 use brickmend::mesh::shapes::{cuboid, sphere};
 use tempfile::TempDir;
 
-#[path = "support/page.rs"]
-mod page;
-
-use page::{Page, file_at};
+use crate::support::page::{Page, file_at};
 
 /// Names that would like to be something else.
 const HOSTILE: [&[u8]; 6] = [
@@ -177,7 +174,7 @@ fn every_result_has_a_page_that_reads_as_it_should() {
             let outcome: serde_json::Value = serde_json::from_str(json).expect("JSON");
             assert_eq!(outcome["input"]["triangles"], model["f"]);
             assert_eq!(outcome["output"]["proof"]["triangles"], model["a"]);
-            assert_eq!(outcome["stages"].as_object().map(serde_json::Map::len), Some(7));
+            assert!(outcome["stages"]["contour"]["resident_bytes"].as_u64() > Some(0));
             assert!(page.all("svg").next().is_some(), "a plot");
         }
         let meshes = page.data("meshes");

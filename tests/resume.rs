@@ -1,7 +1,5 @@
 //! A run goes on from any moment at which it was killed, and from no byte that lies.
 
-mod support;
-
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
@@ -16,9 +14,9 @@ use crate::support::run::{Encoding, Workshop, at_depth};
 
 /// So little that every long step notes its progress many times.
 const CHECKPOINT_BYTES: u64 = 64 << 10;
-const STEPS: [&str; 15] = [
+const STEPS: [&str; 16] = [
     "read", "bin", "settle", "mend", "scan", "patch", "flood", "revise", "sign", "choose", "place",
-    "separate", "draw", "write", "prove",
+    "separate", "draw", "write", "prove", "measure",
 ];
 
 /// A broken model, what comes of it, and images of the work on the way.

@@ -1,7 +1,5 @@
 //! Corners, planes and fill rules: the output where it is known exactly.
 
-mod support;
-
 use brickmend::mesh::shapes::{Corners, Random, cuboid, sphere, volume};
 use brickmend::repair::{MaxHole, Outcome, Settings};
 use brickmend::sign::FillRule;

@@ -1,7 +1,5 @@
 //! Fins, free sheets and panels that something holds: what goes, and what becomes a plate.
 
-mod support;
-
 use brickmend::ingest::SheetRule;
 use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, shuffle, transform};
 use brickmend::repair::{Outcome, Settings};

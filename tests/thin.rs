@@ -1,7 +1,5 @@
 //! Walls thinner than a cell: thickened, never torn; dropped on demand.
 
-mod support;
-
 use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, sphere, transform};
 use brickmend::repair::{Depth, Limits, Settings, ThinRule};
 use glam::{DMat3, DVec3};

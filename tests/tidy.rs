@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Modules of the library by layer; a module imports from strictly lower layers only.
-const LAYERS: [(&str, u32); 21] = [
+const LAYERS: [(&str, u32); 22] = [
     ("monitor", 0),
     ("geom", 1),
     ("mesh", 2),
@@ -25,6 +25,7 @@ const LAYERS: [(&str, u32); 21] = [
     ("paint", STAGE),
     ("verify", STAGE),
     ("diagnose", STAGE),
+    ("deviate", STAGE),
     ("repair", 5),
     ("catalogue", 6),
     ("report", 7),
@@ -364,6 +365,23 @@ fn nothing_is_left_for_later() {
 }
 
 #[test]
+fn every_file_of_tests_is_in_the_binary_of_all() {
+    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("tests");
+    let all = std::fs::read_to_string(root.join("all.rs")).expect("the binary has a root");
+    let mut findings = Vec::new();
+    for entry in std::fs::read_dir(&root).expect("tests are readable") {
+        let name = entry.expect("tests are readable").file_name().into_string().expect("a name");
+        let Some(module) = name.strip_suffix(".rs").filter(|module| *module != "all") else {
+            continue;
+        };
+        if !all.lines().any(|line| line == format!("mod {module};")) {
+            findings.push(format!("tests/{name} is run by nobody"));
+        }
+    }
+    report(findings);
+}
+
+#[test]
 fn links_in_the_documents_lead_somewhere() {
     let root = Path::new(env!("CARGO_MANIFEST_DIR"));
     let documents = [
@@ -374,6 +392,9 @@ fn links_in_the_documents_lead_somewhere() {
         "docs/outcome.md",
         "docs/estimate.md",
         "docs/inspect.md",
+        "docs/verify.md",
+        "docs/journal.md",
+        "docs/parts.md",
         "docs/benchmarks/peers.md",
         "docs/glossary.md",
         "docs/journal.md",

@@ -1,7 +1,5 @@
 //! Units are carried from file to file, and lengths may be given in them.
 
-mod support;
-
 use std::path::Path;
 
 use brickmend::io::{ReadOptions, open};
@@ -14,7 +12,7 @@ use crate::support::run::{Encoding, Workshop, at_depth};
 
 fn unit_of(path: &Path) -> Option<LengthUnit> {
     let folder = tempfile::tempdir().expect("a temporary folder");
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     let mut source = open(path, &Scratch::new(folder.path()), &options).expect("opens");
     source.next_batch(&mut TriangleBatch::default()).expect("reads");
     source.unit()
@@ -43,4 +41,55 @@ fn a_file_in_inches_is_measured_in_millimetres_and_stays_in_inches() {
     }
     let third = workshop.repair(&first.path, "ply", &settings, &limits).expect("a result");
     assert_eq!(third.outcome.transfer.lost, ["the unit"]);
+}
+
+/// The corners of the box of a file as a viewer sees it.
+fn size_of(path: &Path) -> [f64; 3] {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let options = ReadOptions::in_scene(1 << 20);
+    let mut source = open(path, &Scratch::new(folder.path()), &options).expect("opens");
+    let (mut lo, mut hi) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+    let mut batch = TriangleBatch::default();
+    while source.next_batch(&mut batch).expect("reads") {
+        for corner in batch.corners.as_flattened() {
+            for axis in 0..3 {
+                lo[axis] = lo[axis].min(corner[axis]);
+                hi[axis] = hi[axis].max(corner[axis]);
+            }
+        }
+    }
+    [0, 1, 2].map(|axis| hi[axis] - lo[axis])
+}
+
+#[test]
+fn glb_is_in_metres_whatever_the_numbers_are_in() {
+    let workshop = Workshop::new();
+    let input = workshop.write(&cuboid([1.0; 3], [11.0, 6.0, 3.0]), Encoding::Obj);
+    let inches = Settings { unit: Some(LengthUnit::Inch), ..at_depth(5) };
+    let repaired = workshop.repair(&input, "glb", &inches, &Limits::default()).expect("a result");
+    assert!(repaired.outcome.transfer.lost.is_empty());
+    let proof = &repaired.outcome.output.proof;
+    assert!((proof.volume - 100.0).abs() < 0.1, "numbers are inches still: {}", proof.volume);
+    for (found, inches) in size_of(&repaired.path).into_iter().zip([10.0, 5.0, 2.0]) {
+        assert!((found - inches * 0.0254).abs() < 1e-6, "{found}");
+    }
+}
+
+#[test]
+fn numbers_are_turned_into_another_unit_on_request() {
+    let workshop = Workshop::new();
+    let input = workshop.write(&cuboid([1.0; 3], [11.0, 6.0, 3.0]), Encoding::Obj);
+    let to_mm = Settings { to_unit: Some(LengthUnit::Millimeter), ..at_depth(5) };
+    let limits = Limits::default();
+    let refused = workshop.repair(&input, "stl", &to_mm, &limits);
+    assert!(matches!(refused, Err(RepairError::NothingToConvert { .. })));
+    let inches = Settings { unit: Some(LengthUnit::Inch), ..to_mm };
+    for extension in ["stl", "3mf"] {
+        let repaired = workshop.repair(&input, extension, &inches, &limits).expect("a result");
+        for (found, inches) in size_of(&repaired.path).into_iter().zip([10.0, 5.0, 2.0]) {
+            assert!((found - inches * 25.4).abs() < 1e-4, "{found}");
+        }
+    }
+    let written = workshop.repair(&input, "3mf", &inches, &limits).expect("a result");
+    assert_eq!(unit_of(&written.path), Some(LengthUnit::Millimeter));
 }

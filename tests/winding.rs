@@ -1,7 +1,5 @@
 //! The fill rule `nonzero`: cavities stay, overlaps unite, wrong normals are outvoted.
 
-mod support;
-
 use brickmend::mesh::shapes::{Corners, Random, cuboid, rotation, sphere, transform};
 use brickmend::repair::{Outcome, Settings};
 use brickmend::sign::FillRule;

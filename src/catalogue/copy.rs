@@ -89,7 +89,7 @@ fn is_sound(input: &Path, limits: &Limits, monitor: &dyn Monitor) -> Result<bool
         intersections: true,
     };
     let mut open = || {
-        let source = crate::io::open(input, &scratch, &ReadOptions { share_bytes })?;
+        let source = crate::io::open(input, &scratch, &ReadOptions::in_scene(share_bytes))?;
         Ok(source as Box<dyn crate::mesh::MeshSource<Error = _> + Send>)
     };
     match prove(&mut open, &scratch, &options, &pool, monitor) {

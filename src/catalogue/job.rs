@@ -13,7 +13,7 @@ use crate::catalogue::options::Pages;
 use crate::catalogue::stamp::Stamped;
 use crate::io::Format;
 use crate::monitor::Stage;
-use crate::repair::{Blame, Estimate, Outcome, Settings, Verdict};
+use crate::repair::{Blame, Estimate, LeftOut, Outcome, PartsOutcome, Settings, Verdict};
 
 /// A path with any bytes; JSON alone would lose those that are no text.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -208,7 +208,7 @@ pub struct Figures {
     pub area_ratio: Option<f64>,
     /// Volume of the result, cubic model units.
     pub volume: Option<f64>,
-    /// The outcome, as JSON.
+    /// The outcome, as JSON; that of the whole where parts were kept apart.
     pub outcome: String,
 }
 
@@ -229,6 +229,41 @@ impl Figures {
             volume: Some(outcome.output.proof.volume),
             outcome: serde_json::to_string(outcome).expect("plain records serialise"),
         }
+    }
+}
+
+impl Figures {
+    /// Of a model whose parts were kept apart, one outcome after another; [`Figures::close_parts`]
+    /// does the rest.
+    pub(crate) fn add_part(sum: Option<Self>, outcome: &Outcome) -> Self {
+        let part = Self::of(outcome);
+        let Some(sum) = sum else { return Self { outcome: String::new(), ..part } };
+        Self {
+            verdict: sum.verdict.max(part.verdict),
+            reasons: sum.reasons,
+            depth: sum.depth.max(part.depth),
+            triangles_before: sum.triangles_before + part.triangles_before,
+            triangles_after: sum.triangles_after + part.triangles_after,
+            open_edges_before: sum.open_edges_before + part.open_edges_before,
+            duplicates_before: sum.duplicates_before + part.duplicates_before,
+            openings_before: sum.openings_before + part.openings_before,
+            // Parts have units of their own.
+            area_ratio: None,
+            volume: None,
+            outcome: sum.outcome,
+        }
+    }
+
+    /// The figures of a model, given those of its parts.
+    pub(crate) fn close_parts(sum: Self, whole: &PartsOutcome) -> Self {
+        let mut reasons = Vec::new();
+        if whole.to_review > 0 {
+            reasons.push(format!("{} of {} parts are worth a look", whole.to_review, whole.parts));
+        }
+        let of_part = |part: &LeftOut| format!("{} is left out: {}", part.name, part.reason);
+        reasons.extend(whole.left_out.iter().map(of_part));
+        let outcome = serde_json::to_string(whole).expect("plain records serialise");
+        Self { verdict: whole.verdict, reasons, outcome, ..sum }
     }
 }
 

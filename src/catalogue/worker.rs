@@ -10,9 +10,10 @@ use std::path::{Path, PathBuf};
 use crate::catalogue::copy::copy_if_sound;
 use crate::catalogue::job::{Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Task};
 use crate::catalogue::stamp::Stamped;
+use crate::contour::SurfaceDetail;
 use crate::io::{Format, library_name};
 use crate::monitor::Monitor;
-use crate::repair::{Limits, Outcome, RepairError, estimate, repair};
+use crate::repair::{Limits, Outcome, PartsRule, RepairError, estimate, repair, repair_parts};
 
 /// Does what `job` asks for. The caller fills in what the kernel knows of the process, `stamp` what
 /// the caller's monitor knows of a repair.
@@ -60,17 +61,42 @@ fn make(
     {
         return Ok(Made::Copied { files: known_again(&[output])? });
     }
+    if job.settings.parts == PartsRule::Separate {
+        return make_parts(job, input, (&output, &limits), monitor);
+    }
     let mut outcome = repair(input, &output, job.format, &job.settings, &limits, monitor)?;
     stamp(&mut outcome);
-    let files = known_again(&files_of(&output, job.format, &outcome))?;
+    let files = known_again(&files_of(&output, job.format, has_surfaces(&outcome)))?;
     Ok(Made::Repaired { figures: Box::new(Figures::of(&outcome)), files })
 }
 
+/// Repairs the parts of a model, each for itself.
+fn make_parts(
+    job: &Job,
+    input: &Path,
+    (output, limits): (&Path, &Limits),
+    monitor: &dyn Monitor,
+) -> Result<Made, RepairError> {
+    let (mut sum, mut has_library) = (None, false);
+    let mut deliver = |outcome: Outcome| {
+        has_library |= has_surfaces(&outcome);
+        sum = Some(Figures::add_part(sum.take(), &outcome));
+    };
+    let (format, settings) = (job.format, &job.settings);
+    let whole = repair_parts(input, output, format, settings, limits, monitor, &mut deliver)?;
+    let sum = sum.expect("a file has a part at least");
+    let files = known_again(&files_of(output, job.format, has_library))?;
+    Ok(Made::Repaired { figures: Box::new(Figures::close_parts(sum, &whole)), files })
+}
+
+fn has_surfaces(outcome: &Outcome) -> bool {
+    outcome.transfer.surfaces != SurfaceDetail::None
+}
+
 /// The files of a result: beside an OBJ file lies its library.
-fn files_of(output: &Path, format: Format, outcome: &Outcome) -> Vec<PathBuf> {
+fn files_of(output: &Path, format: Format, has_library: bool) -> Vec<PathBuf> {
     let mut files = vec![output.to_path_buf()];
     let library = output.with_file_name(library_name(output));
-    let has_library = outcome.transfer.surfaces != crate::contour::SurfaceDetail::None;
     if format == Format::Obj && has_library {
         files.push(library);
     }

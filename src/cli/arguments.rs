@@ -7,7 +7,8 @@ use brickmend::ingest::SheetRule;
 use brickmend::io::Format;
 use brickmend::mesh::LengthUnit;
 use brickmend::repair::{
-    Depth, HiddenRule, Length, Limits, MaxHole, NormalRule, Reach, Settings, ThinRule,
+    Depth, HiddenRule, Length, Limits, MaxHole, NormalRule, PartsRule, Reach, Settings,
+    TextureRule, ThinRule,
 };
 use brickmend::sign::FillRule;
 use clap::{Args, ValueEnum};
@@ -36,6 +37,9 @@ pub struct ResultArguments {
     /// What becomes of walls thinner than a cell.
     #[arg(long, value_enum, default_value_t = ThinRuleName::Deeper)]
     thin: ThinRuleName,
+    /// What becomes of the parts of a file (OBJ o and g, nodes of glTF, objects of 3MF).
+    #[arg(long, value_enum, default_value_t = PartsRuleName::Union)]
+    parts: PartsRuleName,
     /// What becomes of parts that nobody sees from outside; with --fill-rule solid.
     #[arg(long, value_enum, default_value_t = HiddenRuleName::Remove)]
     hidden: HiddenRuleName,
@@ -66,17 +70,27 @@ pub struct ResultArguments {
     #[arg(long, value_enum, default_value_t = MethodName::Mdc)]
     method: MethodName,
     /// What a model unit is, for files that do not say so: then lengths may be given in mm, cm, m or
-    /// in, and 3MF outputs say it. No number is changed.
+    /// in, and 3MF and GLB outputs say it. No number is changed.
     #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
     units: Option<LengthUnit>,
+    /// Turn all numbers into this unit. Lengths given without a unit are in it, too.
+    #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
+    to_units: Option<LengthUnit>,
     /// Which normals the output gets, in OBJ and GLB: smooth, but for creases (--crease), if the
     /// input has some (keep) or always (smooth).
     #[arg(long, value_enum, default_value_t = NormalRuleName::Keep)]
     normals: NormalRuleName,
+    /// Where images lie that the output names and does not hold, in OBJ and PLY [default: refer; copy
+    /// for batch].
+    #[arg(long, value_enum)]
+    pub textures: Option<TextureRuleName>,
     /// Give what closes openings a material of its own: NAME.patch for what NAME surrounds. In OBJ,
     /// PLY, 3MF and GLB.
     #[arg(long)]
     tag_patches: bool,
+    /// Do not measure how far the output lies from the input.
+    #[arg(long)]
+    no_deviation: bool,
     /// Refuse NaN, infinite corners and wild indices in place of dropping such faces.
     #[arg(long)]
     strict: bool,
@@ -129,11 +143,28 @@ enum ThinRuleName {
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+enum PartsRuleName {
+    /// All become one solid.
+    Union,
+    /// Each is repaired for itself, and keeps its name and its places; where the output has scenes
+    /// (GLB, 3MF) also nodes, transforms and what is shared.
+    Separate,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
 enum HiddenRuleName {
     /// They go, and are named in the outcome.
     Remove,
     /// They stay, unless they are sealed in.
     Keep,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
+pub enum TextureRuleName {
+    /// Those beside the input stay there; those inside of it come beside the output.
+    Refer,
+    /// All come beside the output.
+    Copy,
 }
 
 #[derive(Clone, Copy, Debug, PartialEq, Eq, ValueEnum)]
@@ -217,6 +248,10 @@ impl ResultArguments {
             ThinRuleName::Thicken => ThinRule::Thicken,
             ThinRuleName::Drop => ThinRule::Drop,
         };
+        let parts = match self.parts {
+            PartsRuleName::Union => PartsRule::Union,
+            PartsRuleName::Separate => PartsRule::Separate,
+        };
         let hidden = match self.hidden {
             HiddenRuleName::Remove => HiddenRule::Remove,
             HiddenRuleName::Keep => HiddenRule::Keep,
@@ -231,11 +266,16 @@ impl ResultArguments {
             NormalRuleName::Smooth => NormalRule::Smooth,
             NormalRuleName::None => NormalRule::None,
         };
+        let textures = match self.textures {
+            None | Some(TextureRuleName::Refer) => TextureRule::Refer,
+            Some(TextureRuleName::Copy) => TextureRule::Copy,
+        };
         Settings {
             depth,
             fill_rule,
             sheets,
             thin,
+            parts,
             hidden,
             max_hole,
             max_gap,
@@ -245,8 +285,11 @@ impl ResultArguments {
             decimate,
             max_triangles,
             unit: self.units,
+            to_unit: self.to_units,
+            textures,
             normals,
             tag_patches: self.tag_patches,
+            deviation: !self.no_deviation,
             strict,
         }
     }

@@ -11,7 +11,7 @@ use brickmend::catalogue::{
     Summary, Wanted, run_batch,
 };
 use brickmend::io::Format;
-use brickmend::repair::Blame;
+use brickmend::repair::{Blame, Settings, TextureRule};
 use brickmend::report::report_folder;
 use brickmend::store::StoreError;
 use clap::Args;
@@ -123,7 +123,7 @@ impl BatchArguments {
     /// What is wanted of each model.
     pub fn wanted(&self) -> Wanted {
         Wanted {
-            settings: self.result.settings(),
+            settings: settings_of(&self.result),
             format: self.settings.format.map(Format::from),
             only_broken: !self.settings.all,
         }
@@ -311,4 +311,12 @@ pub fn text_of(summary: &Summary) -> String {
         text.push_str(&format!("\n  failed: {name}: {}: {reason}", failure.cause));
     }
     text
+}
+/// The settings of a batch: its results stand on their own, with copies of their images.
+fn settings_of(arguments: &ResultArguments) -> Settings {
+    let settings = arguments.settings();
+    match arguments.textures {
+        None => Settings { textures: TextureRule::Copy, ..settings },
+        Some(_) => settings,
+    }
 }

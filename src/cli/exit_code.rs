@@ -14,8 +14,8 @@ pub enum Exit {
     Usage = 2,
     /// A batch is done, and some of its models failed.
     SomeFailed = 3,
-    /// The result has no triangle, or another method's is not sound; or an inspection that was to
-    /// check found defects.
+    /// The result has no triangle, or another method's is not sound; an inspection that was to check
+    /// found defects; or a verification failed.
     NoResult = 4,
     /// Output or scratch cannot be used.
     Unusable = 5,
@@ -68,7 +68,7 @@ Exit status:
   1    internal error, also a failed proof: nothing is put in place
   2    usage, also a memory budget below the floor or a disk limit below the estimate
   4    the result has no triangle; or it is not sound, which --method mdc rules out; or
-       inspect --check found defects
+       inspect --check found defects; or the verdict of verify is fail
   5    output or scratch folder unusable, also a full disk: run again to go on
   6    another run holds the work folder
   7    stopped by --max-disk on the way: run again with more to go on

@@ -12,6 +12,7 @@ mod inspect;
 mod last_words;
 mod man;
 mod memory;
+mod numbers;
 mod progress;
 mod repair;
 mod report;
@@ -19,6 +20,7 @@ mod signals;
 mod stage_clock;
 mod status;
 mod time;
+mod verify;
 mod worker;
 
 use std::path::PathBuf;
@@ -53,6 +55,8 @@ enum Command {
     Repair(repair::RepairArguments),
     /// Tell what is wrong with models; changes nothing.
     Inspect(inspect::InspectArguments),
+    /// Prove that a model is sound, and measure how far it lies from an original.
+    Verify(verify::VerifyArguments),
     /// Repair a folder of models, as far as that is not done.
     Batch(batch::BatchArguments),
     /// Tell where a folder of results stands.
@@ -87,6 +91,7 @@ pub fn run() -> std::process::ExitCode {
     match arguments.command {
         Command::Repair(arguments) => repair::run(&arguments, &chatter),
         Command::Inspect(arguments) => inspect::run(&arguments, &chatter),
+        Command::Verify(arguments) => verify::run(&arguments, &chatter),
         Command::Batch(arguments) => batch::run(&arguments, &config, &chatter),
         Command::Status(arguments) => status::run(&arguments, &chatter),
         Command::Report(arguments) => report::run(&arguments, &chatter),

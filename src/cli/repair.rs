@@ -4,9 +4,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
-use brickmend::io::{ReadOptions, format_of_extension};
+use brickmend::io::{Format, ReadOptions, format_of_extension};
 use brickmend::monitor::Void;
-use brickmend::repair::{Levels, Limits, Outcome, RepairError, Verdict, repair, repair_levels};
+use brickmend::repair::{
+    Levels, Limits, Outcome, PartsOutcome, PartsRule, RepairError, Settings, Verdict, repair,
+    repair_levels, repair_parts,
+};
 use brickmend::report::{
     ModelPage, OpenSource, PageOptions, PreviewOptions, ReportError, write_model_page,
     write_preview,
@@ -46,7 +49,8 @@ pub struct RepairArguments {
     /// Start anew, whatever an earlier run of the same work left.
     #[arg(long, help_heading = "Resources")]
     fresh: bool,
-    /// Print the outcome as JSON on stdout, with --lod a list of them; see docs/outcome.md.
+    /// Print the outcome as JSON on stdout, with --lod a list of them, with --parts separate those of
+    /// the parts and of the whole; see docs/outcome.md and docs/parts.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
     /// Draw input beside output into a PNG or EXR file.
@@ -82,6 +86,9 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         ..arguments.resources.limits()
     };
     let (input, output) = (&arguments.input, &arguments.output);
+    if settings.parts == PartsRule::Separate {
+        return run_parts(arguments, (format, &settings, &limits), &progress, (&stop, chatter));
+    }
     let result = match &arguments.lod {
         Some(Levels(levels)) => {
             repair_levels(input, output, format, &settings, levels, &limits, &progress)
@@ -98,6 +105,102 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         }
         Err(error) => fail(&error, &stop, chatter),
     }
+}
+
+/// Repairs the parts of a model, each for itself. Their outcomes are printed as they come.
+fn run_parts(
+    arguments: &RepairArguments,
+    (format, settings, limits): (Format, &Settings, &Limits),
+    progress: &Progress,
+    (stop, chatter): (&Stop, &Chatter),
+) -> ExitCode {
+    if arguments.lod.is_some() {
+        let error = RepairError::OnlyAsUnion { option: "--lod" };
+        return fail(&error, stop, chatter);
+    }
+    if arguments.report.is_some() {
+        let error = RepairError::OnlyAsUnion { option: "--report" };
+        return fail(&error, stop, chatter);
+    }
+    let (input, output) = (&arguments.input, &arguments.output);
+    let mut told = Told { is_json: arguments.json, ..Told::default() };
+    let mut deliver = |outcome: Outcome| told.part(&outcome);
+    let result = repair_parts(input, output, format, settings, limits, progress, &mut deliver);
+    progress.clear();
+    let mut whole = match result {
+        Ok(whole) => whole,
+        Err(error) => return fail(&error, stop, chatter),
+    };
+    let mut exit = if whole.verdict == Verdict::Fail { Exit::NoResult } else { Exit::Success };
+    if let Some(path) = &arguments.preview
+        && let Err(error) = draw(arguments, path)
+    {
+        chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));
+        exit = Exit::Unusable;
+    }
+    whole.stages = progress.stages();
+    whole.peak_bytes = peak_resident_bytes();
+    if arguments.json {
+        told.whole(&whole);
+    } else {
+        chatter.say(&summary_of_parts(&whole, &told.reviews));
+    }
+    exit.into()
+}
+
+/// What was told of parts so far.
+#[derive(Default)]
+struct Told {
+    is_json: bool,
+    parts: u64,
+    /// Names and reasons of the first parts to look at.
+    reviews: Vec<String>,
+}
+
+impl Told {
+    fn part(&mut self, outcome: &Outcome) {
+        if self.is_json {
+            let text = serde_json::to_string(outcome).expect("plain records serialise");
+            let front = if self.parts == 0 { "{\"parts\": [\n" } else { ",\n" };
+            // A reader that went away is no failure of the repair.
+            let _ = write!(std::io::stdout(), "{front}{text}");
+        } else if let (Some(part), Verdict::Review | Verdict::Fail) =
+            (&outcome.part, outcome.verdict)
+            && self.reviews.len() < MOST_REVIEWS
+        {
+            let reasons = outcome.reasons.join("; ");
+            self.reviews.push(format!("{}: {reasons}", on_one_line(&part.name)));
+        }
+        self.parts += 1;
+    }
+
+    fn whole(&self, whole: &PartsOutcome) {
+        let text = serde_json::to_string_pretty(whole).expect("plain records serialise");
+        let _ = writeln!(std::io::stdout(), "\n], \"whole\": {text}}}");
+    }
+}
+
+/// The most parts whose reasons are told as text.
+const MOST_REVIEWS: usize = 8;
+
+fn summary_of_parts(whole: &PartsOutcome, reviews: &[String]) -> String {
+    let mut text = format!(
+        "{}: {} parts in {} places, {} triangles; {} to look at, {} left out",
+        on_one_line(&whole.output.display().to_string()),
+        whole.parts,
+        whole.places,
+        whole.triangles,
+        whole.to_review,
+        whole.empty_parts + whole.hidden_places,
+    );
+    for part in &whole.left_out {
+        text.push_str(&format!("\n  left out: {}: {}", on_one_line(&part.name), part.reason));
+    }
+    for review in reviews {
+        text.push_str("\n  look: ");
+        text.push_str(review);
+    }
+    text
 }
 
 fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
@@ -171,7 +274,7 @@ fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
     let scratch =
         Scratch::new(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
     let share_bytes = arguments.resources.max_memory / 6;
-    let options = ReadOptions { share_bytes };
+    let options = ReadOptions::in_scene(share_bytes);
     let open = |path: &Path| -> Result<Box<dyn brickmend::mesh::MeshSource<Error = _>>, _> {
         let source = brickmend::io::open(path, &scratch, &options)?;
         Ok(source as Box<dyn brickmend::mesh::MeshSource<Error = _>>)

@@ -7,7 +7,7 @@ use std::process::ExitCode;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use brickmend::catalogue::{Job, Made, Report, do_job};
+use brickmend::catalogue::{Job, Made, Pages, Report, do_job};
 use brickmend::monitor::{Monitor, Stage};
 use brickmend::repair::Outcome;
 use brickmend::report::{Gallery, ModelPage};
@@ -99,7 +99,13 @@ fn draw(job: &Job, made: &Made, monitor: &dyn Monitor) {
     };
     let scratch = Scratch::new(&job.work_dir.to_path());
     let share_bytes = job.max_memory_bytes / PAGE_SHARE;
-    let drawn = gallery.write(&model, drawing.wanted, share_bytes, &scratch, monitor);
+    // Of a model whose parts were kept apart there is no one outcome that a page could tell.
+    let is_told = outcome.is_some() || matches!(made, Made::Copied { .. });
+    let wanted = match drawing.wanted {
+        Pages::All if !is_told => Pages::Thumbnails,
+        wanted => wanted,
+    };
+    let drawn = gallery.write(&model, wanted, share_bytes, &scratch, monitor);
     if let Err(error) = drawn {
         let _ = gallery.clear();
         say(&Report::Note { text: format!("{}: no page of it: {error}", drawing.name) });

@@ -7,6 +7,7 @@ use glam::DVec3;
 
 /// The point of the triangle `a`, `b`, `c` closest to `p`.
 #[must_use]
+#[inline]
 pub fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
     let (ab, ac) = (b - a, c - a);
     let (ap, bp, cp) = (p - a, p - b, p - c);
@@ -39,6 +40,7 @@ pub fn closest_on_triangle(p: DVec3, [a, b, c]: [DVec3; 3]) -> DVec3 {
 }
 
 /// A quotient, or nothing where a triangle without area has none.
+#[inline]
 fn share(part: f64, whole: f64) -> f64 {
     if whole > 0.0 { part / whole } else { 0.0 }
 }

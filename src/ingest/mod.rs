@@ -15,6 +15,7 @@
 mod area;
 mod bins;
 mod charts;
+mod converted;
 mod crowds;
 mod duplicates;
 mod edges;
@@ -26,6 +27,8 @@ mod looks;
 mod names;
 mod packed;
 mod rims;
+mod scatter;
+mod scattered;
 #[cfg(test)]
 mod settle_tests;
 mod soup;
@@ -33,6 +36,7 @@ mod sums;
 
 pub use area::SoupMeasure;
 pub use bins::{BIN_ENTRIES, BINS, Bins, fill_bins};
+pub use converted::Converted;
 pub use crowds::LeftOut;
 pub use duplicates::{DROPS, SettleStats, Settled, settle};
 pub use error::IngestError;
@@ -40,5 +44,7 @@ pub use fins::{FinStats, SheetRule, drop_fins};
 pub use looks::{LOOK_MATERIALS, LOOKS};
 pub use names::{PART_NAMES, names_of_parts};
 pub use rims::Rims;
+pub use scatter::{SCATTERED, scatter};
+pub use scattered::{PartSource, PlacedSource, Scattered};
 pub use soup::{ATTRIBUTES, SOUP, Soup, SoupFacts, SoupStats, read_soup};
 pub use sums::{SoupSums, sum_up};

@@ -40,7 +40,7 @@ fn image_of(source: &mut Source, number: u32) -> Vec<u8> {
 }
 
 fn load(path: &Path, scratch: &Scratch) -> Model {
-    let mut source = open(path, scratch, &ReadOptions { share_bytes: 1 << 20 }).expect("opens");
+    let mut source = open(path, scratch, &ReadOptions::in_scene(1 << 20)).expect("opens");
     let mut content = read_all(source.as_mut()).expect("readable");
     let mut writer = PaletteWriter::create(scratch).expect("spools");
     let mut images = Vec::new();

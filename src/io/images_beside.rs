@@ -1,4 +1,5 @@
-//! Images that lie beside an output, since it does not hold them and the input has them inside.
+//! Images that lie beside an output, since it does not hold them and the input has them inside, or
+//! since copies are wanted.
 //!
 //! In:         a palette. Out: each of them with its path; its bytes, to be compared or written.
 //! Memory:     a block of an image.
@@ -57,7 +58,7 @@ impl ImageBeside<'_> {
 }
 
 /// Shows every image that has to lie beside an output of this format, since it does not hold them
-/// and the input has them inside.
+/// and the input has them inside, or copies are wanted.
 ///
 /// # Errors
 /// The palette cannot be read, as `of_io` says it, or what `visit` says.
@@ -75,7 +76,7 @@ pub fn images_beside<E>(
     let mut textures = found.map_err(&of_io)?;
     for number in 0..textures.count() as u32 {
         let image = textures.image(number).map_err(&of_io)?;
-        if matches!(image.texture, Texture::Inside(_)) {
+        if options.copies_images || matches!(image.texture, Texture::Inside(_)) {
             let name = name_beside(&options.output, number, image.kind);
             let path = options.output.with_file_name(name.trim_start_matches("./"));
             visit(&ImageBeside { textures: &textures, image, path })?;

@@ -38,8 +38,10 @@ mod output;
 mod output_names;
 mod packed;
 mod palette;
+mod parts_written;
 mod ply;
 mod polygon;
+mod scene;
 mod stl;
 #[cfg(test)]
 mod tests;
@@ -61,12 +63,13 @@ use crate::io::obj::{ObjWriter, open_obj};
 use crate::io::off::{OffReader, OffWriter};
 pub use crate::io::output::{ASIDE, check_output};
 pub use crate::io::packed::content_name as unpacked_name;
-pub use crate::io::palette::{IMAGES, MATERIALS, Palette, PaletteWriter};
+pub use crate::io::palette::{IMAGES, LookMap, MATERIALS, Palette, PaletteWriter};
 use crate::io::ply::{PlyReader, PlyWriter};
+pub use crate::io::scene::{NODES, SEEN_NODES, SceneTree, SceneWriter};
 use crate::io::stl::{StlWriter, open_stl};
 pub use crate::io::textures::lost_of_materials;
 use crate::io::threemf::{ThreeMfReader, ThreeMfWriter};
-use crate::mesh::{Attributes, LengthUnit, MeshSink, MeshSource, SinkState};
+use crate::mesh::{Attributes, LengthUnit, MeshSink, MeshSource, Placement, SinkState};
 use crate::store::Scratch;
 
 /// The most triangles in one batch.
@@ -138,10 +141,23 @@ impl Format {
         }
     }
 
-    /// Whether a reader of this format learns from it that the numbers are in `unit`.
+    /// Whether a reader of this format learns from it what a unit is: in GLB nodes scale numbers to
+    /// metres.
     #[must_use]
-    pub fn holds_unit(self, unit: LengthUnit) -> bool {
-        self == Self::ThreeMf || self == Self::Glb && unit == LengthUnit::Meter
+    pub fn holds_unit(self) -> bool {
+        self == Self::ThreeMf || self == Self::Glb
+    }
+
+    /// Whether files hold the nodes of a scene, which parts stand in.
+    #[must_use]
+    pub fn has_scenes(self) -> bool {
+        matches!(self, Self::ThreeMf | Self::Glb)
+    }
+
+    /// Whether files hold the names of parts.
+    #[must_use]
+    pub fn has_parts(self) -> bool {
+        matches!(self, Self::Obj | Self::ThreeMf | Self::Glb)
     }
 
     /// Whether triangles name vertices by number.
@@ -156,6 +172,22 @@ impl Format {
 pub struct ReadOptions {
     /// Memory for vertices and buffers; what exceeds it goes to the scratch folder.
     pub share_bytes: u64,
+    /// What becomes of the places of parts.
+    pub placement: Placement,
+}
+
+impl ReadOptions {
+    /// Every part where it stands, within `share_bytes`.
+    #[must_use]
+    pub const fn in_scene(share_bytes: u64) -> Self {
+        Self { share_bytes, placement: Placement::InScene }
+    }
+
+    /// Every part once, in its own coordinates, within `share_bytes`.
+    #[must_use]
+    pub const fn by_itself(share_bytes: u64) -> Self {
+        Self { share_bytes, placement: Placement::ByItself }
+    }
 }
 
 /// How to write.
@@ -168,9 +200,14 @@ pub struct WriteOptions {
     /// What vertices and corners will have besides; what [`Format::attributes`] lacks is not
     /// written. With texture coordinates, materials show their images.
     pub attributes: Attributes,
+    /// Where parts stand, for formats that have scenes; each where its vertices are if `None`.
+    pub scene: Option<SceneTree>,
+    /// Whether images that the output names and does not hold lie beside it; else those that lie
+    /// beside the input stay there.
+    pub copies_images: bool,
     /// Where the output will be in the end: the ways to images lead from there.
     pub output: PathBuf,
-    /// What a model unit is, for formats that say so (3MF).
+    /// What a model unit is, for formats that say so (3MF, GLB).
     pub unit: Option<LengthUnit>,
     /// File name of the material library beside an OBJ file, see [`library_name`].
     pub library: String,

@@ -3,6 +3,7 @@
 //! Both the output and what waits beside it can be gone on with by a later run, from any state
 //! that [`Stream::state`] told. Memory: one buffer of 256 KiB each.
 
+use std::ops::Range;
 use std::path::Path;
 
 use crate::io::error::IoError;
@@ -208,13 +209,22 @@ impl Aside {
     /// Shows all bytes in order, in blocks of 256 KiB but for the last.
     pub(crate) fn for_each_block(
         &mut self,
+        visit: impl FnMut(&[u8]) -> Result<(), IoError>,
+    ) -> Result<(), IoError> {
+        self.for_each_block_in(0..self.bytes(), visit)
+    }
+
+    /// The same for some of the bytes.
+    pub(crate) fn for_each_block_in(
+        &mut self,
+        range: Range<u64>,
         mut visit: impl FnMut(&[u8]) -> Result<(), IoError>,
     ) -> Result<(), IoError> {
         self.stream.flush()?;
         let mut block = vec![0; BUFFER_BYTES];
-        let mut at = 0;
-        while at < self.stream.written_bytes {
-            let left = self.stream.written_bytes - at;
+        let mut at = range.start;
+        while at < range.end {
+            let left = range.end - at;
             let part = &mut block[..left.min(BUFFER_BYTES as u64) as usize];
             self.stream.file.read_at(part, at)?;
             visit(part)?;

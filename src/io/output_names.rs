@@ -1,11 +1,11 @@
-//! Names of materials as a writer gives them: none empty, no two alike, one line each.
+//! Names of materials and parts as a writer gives them: none empty, no two alike, one line each.
 //!
-//! In:         a palette. Out: a name for every number.
+//! In:         a palette, or one name after another. Out: a name for every number.
 //! Memory:     the share of a dictionary, spilled beyond.
 
 use crate::io::error::IoError;
 use crate::io::palette::Palette;
-use crate::mesh::{Material, Surface};
+use crate::mesh::Surface;
 use crate::store::{Dictionary, Scratch, StoreError};
 
 /// Memory for names; the least that a dictionary asks for.
@@ -20,11 +20,7 @@ impl OutputNames {
     pub(crate) fn new(palette: &Palette, scratch: &Scratch) -> Result<Self, IoError> {
         let mut names = Dictionary::new(scratch, SHARE_BYTES);
         palette.for_each(|number, material| {
-            let mut name = plain_name(&material, number);
-            while names.find(name.as_bytes())?.is_some() {
-                name = format!("{name}_{number}");
-            }
-            names.number(name.as_bytes())?;
+            enter(&mut names, ("material", number), &material.name)?;
             Ok(())
         })?;
         Ok(Self { names })
@@ -38,10 +34,53 @@ impl OutputNames {
     }
 }
 
-/// The name that the file gives, in one line.
-fn plain_name(material: &Material, number: u32) -> String {
-    let name: String =
-        material.name.chars().map(|c| if c.is_control() { '_' } else { c }).collect();
-    let name = name.trim();
-    if name.is_empty() { format!("material_{number}") } else { name.to_owned() }
+/// The names of parts, as they come.
+pub(crate) struct PartNames {
+    names: Dictionary,
+}
+
+impl PartNames {
+    pub(crate) fn new(scratch: &Scratch) -> Self {
+        Self { names: Dictionary::new(scratch, SHARE_BYTES) }
+    }
+
+    /// A name for the part with this number.
+    pub(crate) fn name(&mut self, number: u32, name: &str) -> Result<String, StoreError> {
+        enter(&mut self.names, ("part", number), name)
+    }
+}
+
+/// Enters the name that a file gives, in one line, and as no other is.
+fn enter(
+    names: &mut Dictionary,
+    (kind, number): (&str, u32),
+    name: &str,
+) -> Result<String, StoreError> {
+    let name: String = name.chars().map(|c| if c.is_control() { '_' } else { c }).collect();
+    let mut name = match name.trim() {
+        "" => format!("{kind}_{number}"),
+        name => name.to_owned(),
+    };
+    while names.find(name.as_bytes())?.is_some() {
+        name = format!("{name}_{number}");
+    }
+    names.number(name.as_bytes())?;
+    Ok(name)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn parts_have_names_of_their_own_in_one_line() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let mut names = PartNames::new(&Scratch::new(folder.path()));
+        let mut name = |number, name| names.name(number, name).expect("named");
+        assert_eq!(name(0, "leg"), "leg");
+        assert_eq!(name(1, " leg "), "leg_1");
+        assert_eq!(name(2, "a\nb"), "a_b");
+        assert_eq!(name(3, ""), "part_3");
+        assert_eq!(name(4, "leg_1"), "leg_1_4");
+    }
 }

@@ -141,15 +141,18 @@ impl Palette {
     }
 
     /// The way from looks to materials.
-    pub(crate) fn looks(&self) -> Result<Looks, StoreError> {
-        let Some(state) = &self.looks else { return Ok(Looks::default()) };
+    ///
+    /// # Errors
+    /// The spool is missing or damaged.
+    pub fn looks(&self) -> Result<LookMap, StoreError> {
+        let Some(state) = &self.looks else { return Ok(LookMap::default()) };
         let spool = Spool::<u32>::open(&self.scratch, state)?;
         let mut materials = Table::new(&self.scratch, SHARE_BYTES);
         let mut reader = spool.reader(0, spool.len());
         while let Some(block) = reader.next_block()? {
             block.iter().try_for_each(|&material| materials.push(material))?;
         }
-        Ok(Looks { materials: Some(materials), mapped: Vec::new() })
+        Ok(LookMap { materials: Some(materials), mapped: Vec::new() })
     }
 
     /// The bytes of all images inside of the model, if they were kept.
@@ -165,14 +168,17 @@ impl Palette {
 
 /// The materials of looks; each is its own look where there are none.
 #[derive(Default)]
-pub(crate) struct Looks {
+pub struct LookMap {
     materials: Option<Table<u32>>,
     mapped: Vec<Surface>,
 }
 
-impl Looks {
+impl LookMap {
     /// The same surfaces by material.
-    pub(crate) fn materials_of<'s>(
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn materials_of<'s>(
         &'s mut self,
         surfaces: &'s [Surface],
     ) -> Result<&'s [Surface], StoreError> {

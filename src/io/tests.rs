@@ -82,7 +82,7 @@ pub(crate) fn read_all(source: &mut dyn MeshSource<Error = IoError>) -> Result<C
 
 fn read_path(path: &Path, share_bytes: u64) -> Result<Content, IoError> {
     let scratch = Scratch::new(path.parent().expect("a file in a folder"));
-    read_all(open(path, &scratch, &ReadOptions { share_bytes })?.as_mut())
+    read_all(open(path, &scratch, &ReadOptions::in_scene(share_bytes))?.as_mut())
 }
 
 pub(crate) fn read_bytes(name: &str, content: &[u8]) -> Result<Content, IoError> {

@@ -207,7 +207,8 @@ impl Textures {
         options: &WriteOptions,
     ) -> Result<Option<String>, IoError> {
         let image = self.image(number)?;
-        let Some(path) = self.path_of(&image.texture) else {
+        let path = self.path_of(&image.texture).filter(|_| !options.copies_images);
+        let Some(path) = path else {
             return Ok(Some(name_beside(&options.output, number, image.kind)));
         };
         let Some(folder) = folder_of(&options.output) else { return Ok(None) };

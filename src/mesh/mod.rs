@@ -7,6 +7,7 @@ pub mod shapes;
 mod attributes;
 mod batch;
 mod material;
+mod scene;
 mod sink;
 mod source;
 mod texture;
@@ -15,6 +16,7 @@ mod unit;
 pub use attributes::Attributes;
 pub use batch::{NO_POLYGON, Part, TriangleBatch};
 pub use material::{Material, Surface};
+pub use scene::{Affine, IDENTITY, Placement, SceneNode, apply, compose, mirrors, stretch};
 pub use sink::{
     CornerForm, CornerValues, DrawnFrom, InnerCrossing, MeshSink, SinkFile, SinkState, SinkStats,
     SinkTriangles, VertexValues,

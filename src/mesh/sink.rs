@@ -132,6 +132,16 @@ pub trait MeshSink {
     /// What can go wrong in the world of this sink.
     type Error: std::error::Error;
 
+    /// Begins a part: what follows is of it, until the next one begins. Its number is that of
+    /// [`crate::mesh::SceneNode::part`]. Triangles name vertices of their own part only. A file that
+    /// is never told of a part has one, without a name.
+    ///
+    /// # Errors
+    /// The file cannot be written.
+    fn begin_part(&mut self, _number: u32, _name: &str) -> Result<(), Self::Error> {
+        Ok(())
+    }
+
     /// Appends vertices; their numbers go on from the last one, starting at 0. Model units.
     ///
     /// # Errors

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::{LengthUnit, Material, Part, TriangleBatch};
+use crate::mesh::{LengthUnit, Material, Part, SceneNode, TriangleBatch};
 
 /// Faces that a reader had to leave out because they lead nowhere. Defects, not errors.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
@@ -68,6 +68,20 @@ pub trait MeshSource {
     ) -> Result<(), Self::Error> {
         bytes.clear();
         Ok(())
+    }
+
+    /// How many nodes there are; known once the last batch was delivered. None where the format has
+    /// no scenes, or where parts are read in their places.
+    fn node_count(&self) -> u64 {
+        0
+    }
+
+    /// A node by its number, which is below [`MeshSource::node_count`]; `None` where there is none.
+    ///
+    /// # Errors
+    /// As for [`MeshSource::part`].
+    fn node(&mut self, _number: u32) -> Result<Option<SceneNode>, Self::Error> {
+        Ok(None)
     }
 
     /// What a model unit is, where the file says so; known once a batch was delivered.

@@ -29,11 +29,13 @@ pub enum Stage {
     Contour,
     /// The proof on the written file.
     Verify,
+    /// The written file beside the input.
+    Deviate,
 }
 
 impl Stage {
     /// All stages in running order.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 8] = [
         Self::Ingest,
         Self::Bridge,
         Self::Scan,
@@ -41,6 +43,7 @@ impl Stage {
         Self::Sign,
         Self::Contour,
         Self::Verify,
+        Self::Deviate,
     ];
 
     /// The name used in the outcome and in the work folder.
@@ -54,6 +57,7 @@ impl Stage {
             Self::Sign => "sign",
             Self::Contour => "contour",
             Self::Verify => "verify",
+            Self::Deviate => "deviate",
         }
     }
 }

@@ -24,7 +24,8 @@ fn roomy(ruler: &Ruler, sheet_thickness: Reach) -> SnapBox {
 }
 
 /// The domain around the box of `ruler`, with room for walls, at the depth that `depth` means for
-/// it and for the output's format.
+/// it and for the output's format; its cells are no smaller than `finest`, as far as there is a
+/// grid so coarse.
 ///
 /// # Errors
 /// [`RepairError::NoUnit`] for metres where nobody states the unit of `input`; or
@@ -35,6 +36,7 @@ pub fn choose_domain(
     depth: Depth,
     sheet_thickness: Reach,
     format: Format,
+    finest: f64,
 ) -> Result<Domain, RepairError> {
     let bounds = &roomy(ruler, sheet_thickness);
     let single = format.coordinates() == CoordinateType::F32;
@@ -43,7 +45,7 @@ pub fn choose_domain(
             .map_err(|possible_depth| RepairError::OutputTooCoarse { depth, possible_depth })
     };
     let (length, max_depth) = match depth {
-        Depth::Levels(depth) => return around(depth),
+        Depth::Levels(depth) => return no_finer(around(depth)?, finest, around),
         Depth::Auto { max_depth } => (Depth::DEFAULT_TOLERANCE, max_depth),
         Depth::Tolerance { length, max_depth } => (length, max_depth),
     };
@@ -56,6 +58,19 @@ pub fn choose_domain(
             break;
         }
         domain = around(depth)?;
+    }
+    no_finer(domain, finest, around)
+}
+
+/// The domain, or the deepest one whose cells are no smaller than `finest`.
+fn no_finer(
+    domain: Domain,
+    finest: f64,
+    around: impl Fn(u32) -> Result<Domain, RepairError>,
+) -> Result<Domain, RepairError> {
+    let mut domain = domain;
+    while domain.cell_size() < finest && domain.depth > *Depth::RANGE.start() {
+        domain = around(domain.depth - 1)?;
     }
     Ok(domain)
 }

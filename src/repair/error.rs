@@ -97,6 +97,12 @@ pub enum RepairError {
         /// What asked for it.
         option: &'static str,
     },
+    /// Parts that are kept apart, and something that is there for one solid only.
+    #[error("{option} is for one solid, and --parts separate keeps several apart")]
+    OnlyAsUnion {
+        /// What asked for it.
+        option: &'static str,
+    },
     /// No threshold gives as few triangles as were asked for.
     #[error(
         "At most {limit} triangles were asked for, and the surface has {fewest} at the least, \
@@ -114,6 +120,12 @@ pub enum RepairError {
          or %"
     )]
     NoUnit {
+        /// The input.
+        path: PathBuf,
+    },
+    /// Numbers to be converted in a file without a unit.
+    #[error("{path} states no unit, so its numbers cannot be turned into another; say --units")]
+    NothingToConvert {
         /// The input.
         path: PathBuf,
     },
@@ -227,8 +239,10 @@ impl RepairError {
             | Self::ForeignLibrary { .. }
             | Self::SameLevel { .. }
             | Self::NothingToMerge { .. }
+            | Self::OnlyAsUnion { .. }
             | Self::TooManyTriangles { .. }
             | Self::NoUnit { .. }
+            | Self::NothingToConvert { .. }
             | Self::OutputTooCoarse { .. } => Blame::Usage,
             Self::EmptyResult { .. } => Blame::Model,
             Self::Locked { .. } => Blame::Lock,

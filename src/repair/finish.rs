@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use crate::monitor::{Counter, Gauge, Monitor};
 use crate::repair::deeper::depth_reason;
+use crate::repair::measuring::deviation_reasons;
 use crate::repair::outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, Verdict,
@@ -43,11 +44,13 @@ pub fn conclude(
     let area_ratio = proof.area / findings.measure.area;
     let broken = broken_promises(&proof);
     let mut reasons = reasons(run, findings, &invented, &dropped, area_ratio, &proof);
+    deviation_reasons(findings, proof.area, &mut reasons);
     let verdict = judge(&broken, &mut reasons);
     run.recording.gauge(Gauge::GrantedBytes, run.accountant.peak_bytes());
     Outcome {
         schema: SCHEMA_VERSION,
         version: env!("CARGO_PKG_VERSION").to_owned(),
+        part: None,
         verdict,
         reasons,
         input: SoupReport {
@@ -79,6 +82,7 @@ pub fn conclude(
             contour: findings.contour,
             caveat: run.settings.method.caveat().map(str::to_owned),
         },
+        deviation: findings.deviation.clone(),
         mend: findings.mend.clone(),
         thickened: findings.thickened,
         hidden: findings.hidden.clone(),

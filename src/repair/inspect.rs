@@ -89,7 +89,7 @@ fn read(input: &Path, means: &Means<'_>) -> Result<Model, RepairError> {
     let total = std::fs::metadata(input).map_or(0, |metadata| metadata.len());
     means.monitor.begin(Stage::Ingest, total);
     // The sorts and the tape of the model take the rest.
-    let options = ReadOptions { share_bytes: means.share_bytes / 4 };
+    let options = ReadOptions::in_scene(means.share_bytes / 4);
     let source = crate::io::open(input, means.scratch, &options);
     let mut source = source.map_err(RepairError::Input)?;
     let model =

@@ -18,9 +18,11 @@ mod inspection;
 mod length;
 mod levels;
 mod lock;
+mod measuring;
 mod mending;
 mod outcome;
 mod painting;
+mod parts;
 mod plan;
 mod revising;
 mod run;
@@ -29,6 +31,10 @@ mod stages;
 mod standing;
 mod step;
 mod surfaces;
+mod thresholds;
+mod verdict;
+mod verification;
+mod verify_file;
 mod workspace;
 
 pub use deeper::DepthTrial;
@@ -45,6 +51,16 @@ pub use outcome::{
     DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
     SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
+pub use parts::{LeftOut, PartReport, PartsOutcome, repair_parts};
 pub use plan::{MemoryPlan, floor_bytes};
 pub use run::{repair, repair_levels};
-pub use settings::{Depth, HiddenRule, Limits, MaxHole, NormalRule, Settings, ThinRule};
+pub use settings::{
+    Depth, HiddenRule, Limits, MaxHole, NormalRule, PartsRule, Settings, TextureRule, ThinRule,
+};
+pub use thresholds::{
+    Degrees, Measured, NoNumber, Share, Threshold, ThresholdError, VerifySettings,
+};
+pub use verification::{
+    Reason, SurfaceReport, Thresholds, VERIFICATION_VERSION, Verification, VertexNames,
+};
+pub use verify_file::verify_file;

@@ -7,12 +7,14 @@ use serde::{Deserialize, Serialize, Serializer};
 
 use crate::bridge::{MendStats, ThickenStats};
 use crate::contour::{ContourStats, SurfaceDetail};
+use crate::deviate::Deviation;
 use crate::hidden::HiddenStats;
 use crate::ingest::{SettleStats, SoupMeasure, SoupStats};
 use crate::mesh::Attributes;
 use crate::monitor::{Counter, Gauge, Stage};
 use crate::octree::{Domain, SnapBox};
 use crate::patch::{Opening, PatchStats};
+use crate::repair::parts::PartReport;
 use crate::repair::settings::Settings;
 use crate::scan::ScanStats;
 use crate::sign::{SignStats, VoteStats};
@@ -23,7 +25,7 @@ use crate::verify::Proof;
 pub const SCHEMA_VERSION: u32 = 1;
 
 /// How good the result is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
     /// Nothing to look at.
@@ -180,6 +182,9 @@ pub struct Outcome {
     pub schema: u32,
     /// Version of the program.
     pub version: String,
+    /// Which part of the model this is of, with `--parts separate`.
+    #[serde(default)]
+    pub part: Option<PartReport>,
     /// How good the result is.
     pub verdict: Verdict,
     /// What a person should look at.
@@ -202,6 +207,9 @@ pub struct Outcome {
     pub dropped: Dropped,
     /// The output.
     pub output: OutputReport,
+    /// How far the output lies from the input; `None` if that was not wanted, or the input is too
+    /// large for squares of its lengths.
+    pub deviation: Option<Deviation>,
     /// Counts of mending: walls and fills.
     pub mend: MendStats,
     /// Counts of what was thickened.

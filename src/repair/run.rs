@@ -3,10 +3,12 @@
 use std::fs::Metadata;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
+use std::sync::Mutex;
 
 use rayon::ThreadPool;
 
 use crate::contour::Method;
+use crate::ingest::Scattered;
 use crate::io::{Format, IoError, check_output};
 use crate::monitor::{Counter, Monitor, Recording};
 use crate::repair::RepairError;
@@ -25,7 +27,7 @@ use crate::store::{Accountant, Resources, StoreError};
 
 /// Files of the work folder that are made again in one run; beyond that the disk is not to be
 /// trusted.
-const MOST_WAYS_BACK: usize = 3;
+pub(crate) const MOST_WAYS_BACK: usize = 3;
 
 /// Repairs `input` into `output`, whose format is told by its extension (PLY when it has none).
 ///
@@ -106,7 +108,19 @@ fn run(
     keep_libraries(format, outputs.iter())?;
     let workspace = Workspace::open(input, output, outputs, limits, key)?;
     let accountant = Accountant::new(limits.max_memory_bytes);
-    let run = Run { input, format, settings, levels, limits, plan, recording, accountant, seen };
+    let run = Run {
+        input,
+        feed: Feed::File,
+        finest: 0.0,
+        format,
+        settings,
+        levels,
+        limits,
+        plan,
+        recording: &recording,
+        accountant: &accountant,
+        seen,
+    };
     match run.to_the_end(&workspace, &pool) {
         Ok(outcomes) => {
             workspace.remove();
@@ -122,7 +136,7 @@ fn run(
 }
 
 /// Refuses an output that is the input under any name: the rename at the end would replace it.
-fn keep_input(input: &Path, output: &Path) -> Result<(), RepairError> {
+pub(crate) fn keep_input(input: &Path, output: &Path) -> Result<(), RepairError> {
     let identity = |path| std::fs::metadata(path).map(|file| (file.dev(), file.ino())).ok();
     match (identity(input), identity(output)) {
         (Some(a), Some(b)) if a == b => {
@@ -132,7 +146,7 @@ fn keep_input(input: &Path, output: &Path) -> Result<(), RepairError> {
     }
 }
 
-fn start_threads(threads: usize) -> Result<ThreadPool, RepairError> {
+pub(crate) fn start_threads(threads: usize) -> Result<ThreadPool, RepairError> {
     rayon::ThreadPoolBuilder::new()
         .num_threads(threads)
         .thread_name(|number| format!("brick-{number}"))
@@ -141,7 +155,7 @@ fn start_threads(threads: usize) -> Result<ThreadPool, RepairError> {
 }
 
 /// blake3 of input bytes, settings, levels, format and version: another key is another run.
-fn run_key(
+pub(crate) fn run_key(
     input: &Path,
     format: Format,
     settings: &Settings,
@@ -174,6 +188,13 @@ fn run_key(
     Ok(*hasher.finalize().as_bytes())
 }
 
+/// The key of a part of a run with this `key`.
+pub(crate) fn part_key(key: [u8; 32], number: u32) -> [u8; 32] {
+    let mut hasher = blake3::Hasher::new_keyed(&key);
+    hasher.update(&number.to_le_bytes());
+    *hasher.finalize().as_bytes()
+}
+
 /// Passes on nothing but the wish to stop.
 struct OnlyCancel<'m> {
     monitor: &'m dyn Monitor,
@@ -195,7 +216,7 @@ pub struct InputIdentity {
 }
 
 impl InputIdentity {
-    fn of(path: &Path) -> Result<Self, RepairError> {
+    pub(crate) fn of(path: &Path) -> Result<Self, RepairError> {
         let failed = |source| {
             RepairError::Input(IoError::Input { doing: "open", path: path.to_path_buf(), source })
         };
@@ -209,18 +230,41 @@ impl InputIdentity {
     }
 }
 
+/// Where the triangles of a run come from.
+pub enum Feed<'r> {
+    /// The input file.
+    File,
+    /// All parts of it in their places.
+    Placed {
+        /// The parts.
+        of: &'r Mutex<Scattered>,
+    },
+    /// A part of it.
+    Part {
+        /// All of them.
+        of: &'r Mutex<Scattered>,
+        /// Which.
+        number: u32,
+        /// Its name.
+        name: String,
+    },
+}
+
 /// A run under way.
 pub struct Run<'r> {
     pub input: &'r Path,
+    pub feed: Feed<'r>,
+    /// No cell is smaller, as far as that can be.
+    pub finest: f64,
     pub format: Format,
     pub settings: Settings,
     /// The thresholds, one after the other, and their files.
-    levels: Vec<Level>,
+    pub levels: Vec<Level>,
     pub limits: &'r Limits,
     pub plan: MemoryPlan,
-    pub recording: Recording<'r>,
-    pub accountant: Accountant,
-    seen: InputIdentity,
+    pub recording: &'r Recording<'r>,
+    pub accountant: &'r Accountant,
+    pub seen: InputIdentity,
 }
 
 impl Run<'_> {
@@ -232,7 +276,7 @@ impl Run<'_> {
         pool: &ThreadPool,
     ) -> Result<Vec<Outcome>, RepairError> {
         self.check_disk_limit(workspace)?;
-        let _leases = self.plan.lease(&self.accountant)?;
+        let _leases = self.plan.lease(self.accountant)?;
         let mut rebuilt = Vec::new();
         loop {
             let error = match self.all_levels(workspace, pool, &rebuilt) {
@@ -259,7 +303,7 @@ impl Run<'_> {
         let limits =
             Limits { work_dir: Some(workspace.folder().to_path_buf()), ..self.limits.clone() };
         // The estimate reads the input as well; what it reads is not what the run reads.
-        let quiet = OnlyCancel { monitor: &self.recording };
+        let quiet = OnlyCancel { monitor: self.recording };
         let needed_bytes = estimate(self.input, self.format, &self.settings, &limits, &quiet)?
             .disk_bytes_with_levels(self.levels.len() as u64);
         if needed_bytes > limit_bytes {
@@ -280,9 +324,9 @@ impl Run<'_> {
         let mut handles = Handles::default();
         loop {
             if !workspace.is_in_place() {
-                self.steps(workspace, pool, &mut findings, &mut handles)?;
-                self.put_images(workspace, &findings)?;
-                self.put_library(workspace, &findings)?;
+                let last = Step::Measure;
+                self.steps(workspace, pool, &mut findings, &mut handles, last)?;
+                self.put_beside(workspace, &findings)?;
                 workspace.put_in_place()?;
                 let output = self.level(&findings).output.display();
                 self.recording.note(&format!("{output} is in place"));
@@ -341,7 +385,7 @@ impl Run<'_> {
     }
 
     /// Brings the counters up to what moved so far.
-    fn count_scratch(&self, workspace: &Workspace) {
+    pub(crate) fn count_scratch(&self, workspace: &Workspace) {
         let scratch = workspace.scratch();
         for (counter, total) in [
             (Counter::ScratchBytesRead, scratch.read_bytes()),
@@ -352,13 +396,14 @@ impl Run<'_> {
         }
     }
 
-    /// Does the steps that are left of the level under way.
-    fn steps(
+    /// Does the steps that are left of the level under way, up to the `last`.
+    pub(crate) fn steps(
         &self,
         workspace: &Workspace,
         pool: &ThreadPool,
         findings: &mut Findings,
         handles: &mut Handles,
+        last: Step,
     ) -> Result<(), RepairError> {
         if let (None, Some(written)) = (workspace.next_step(), workspace.written()) {
             check_output(workspace.part(), &written, workspace.scratch())?;
@@ -370,11 +415,11 @@ impl Run<'_> {
                 *handles = Handles::default();
                 workspace.go_back_to(Step::Bin, to_text(findings))?;
             }
-            let Some(step) = workspace.next_step() else { break };
+            let Some(step) = workspace.next_step().filter(|step| *step <= last) else { break };
             if self.recording.cancelled() {
                 return Err(StoreError::Cancelled.into());
             }
-            let checkpoints = workspace.checkpoints(step, &self.recording);
+            let checkpoints = workspace.checkpoints(step, self.recording);
             let resources = Resources {
                 scratch: workspace.scratch(),
                 pool,
@@ -382,7 +427,7 @@ impl Run<'_> {
                 cached_windows: self.plan.cached_windows,
                 backing: self.limits.backing,
                 checkpoints: &checkpoints,
-                monitor: &self.recording,
+                monitor: self.recording,
             };
             let files = self.step(step, workspace, findings, handles, &resources)?;
             // What the next level starts from outlives this one.
@@ -394,7 +439,7 @@ impl Run<'_> {
     }
 
     /// What the steps of an earlier run found out.
-    fn earlier_findings(&self, workspace: &Workspace) -> Result<Findings, RepairError> {
+    pub(crate) fn earlier_findings(&self, workspace: &Workspace) -> Result<Findings, RepairError> {
         let found: Result<Findings, _> = serde_json::from_str(&workspace.findings());
         if workspace.next_step() == Some(Step::Read) {
             let finished = found.map(|found| found.finished).unwrap_or_default();
@@ -420,6 +465,6 @@ impl Run<'_> {
 }
 
 /// Findings as the manifest holds them.
-fn to_text(findings: &Findings) -> String {
+pub(crate) fn to_text(findings: &Findings) -> String {
     serde_json::to_string(findings).expect("plain records serialise")
 }

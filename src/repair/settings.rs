@@ -107,6 +107,28 @@ pub enum NormalRule {
     None,
 }
 
+/// What becomes of the parts of a model.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum PartsRule {
+    /// All of them become one solid.
+    #[default]
+    Union,
+    /// Each is repaired for itself, and keeps its name and its places.
+    Separate,
+}
+
+/// Where images lie that an output names and does not hold (OBJ, PLY).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum TextureRule {
+    /// Those beside the input stay there; those inside of it come beside the output.
+    #[default]
+    Refer,
+    /// All come beside the output.
+    Copy,
+}
+
 /// Everything that changes the result.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Settings {
@@ -118,6 +140,9 @@ pub struct Settings {
     pub sheets: SheetRule,
     /// What becomes of walls thinner than a cell.
     pub thin: ThinRule,
+    /// What becomes of the parts of a model.
+    #[serde(default)]
+    pub parts: PartsRule,
     /// What becomes of parts that nobody sees.
     pub hidden: HiddenRule,
     /// Which openings are filled.
@@ -137,10 +162,18 @@ pub struct Settings {
     pub max_triangles: Option<u64>,
     /// What a model unit is, for files that do not say so.
     pub unit: Option<LengthUnit>,
+    /// The unit that numbers are turned into; they stay as they are if `None`.
+    #[serde(default)]
+    pub to_unit: Option<LengthUnit>,
+    /// Where images lie that the output does not hold.
+    #[serde(default)]
+    pub textures: TextureRule,
     /// Which normals the output gets.
     pub normals: NormalRule,
     /// Whether what closes openings is told apart in the output, where its format can.
     pub tag_patches: bool,
+    /// Whether the output is compared with the input at the end.
+    pub deviation: bool,
     /// Refuse broken faces in place of dropping them.
     pub strict: bool,
 }
@@ -152,6 +185,7 @@ impl Default for Settings {
             fill_rule: FillRule::Solid,
             sheets: SheetRule::Thicken,
             thin: ThinRule::Deeper,
+            parts: PartsRule::Union,
             hidden: HiddenRule::Remove,
             max_hole: MaxHole::Auto,
             max_gap: Reach::Cells(2.0),
@@ -161,8 +195,11 @@ impl Default for Settings {
             decimate: Reach::DEFAULT_DECIMATE,
             max_triangles: None,
             unit: None,
+            to_unit: None,
+            textures: TextureRule::Refer,
             normals: NormalRule::Keep,
             tag_patches: false,
+            deviation: true,
             strict: false,
         }
     }
@@ -186,10 +223,13 @@ impl Settings {
     /// Refuses what cannot be, whatever the model.
     ///
     /// # Errors
-    /// [`RepairError::NothingToMerge`].
+    /// [`RepairError::NothingToMerge`], [`RepairError::OnlyAsUnion`].
     pub(crate) fn check(&self) -> Result<(), RepairError> {
         if self.max_triangles.is_some() && self.method != Method::Mdc {
             return Err(RepairError::NothingToMerge { option: "--max-triangles" });
+        }
+        if self.max_triangles.is_some() && self.parts == PartsRule::Separate {
+            return Err(RepairError::OnlyAsUnion { option: "--max-triangles" });
         }
         Ok(())
     }

@@ -1,5 +1,8 @@
 //! The steps of a repair: each opens what earlier ones left, does its work, and names its files.
 
+use std::path::Path;
+use std::sync::PoisonError;
+
 use serde::{Deserialize, Serialize};
 
 use crate::bridge::{MendStats, Mended, ThickenStats};
@@ -7,13 +10,14 @@ use crate::contour::{
     CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
     write_surface,
 };
+use crate::deviate::Deviation;
 use crate::hidden::HiddenStats;
 use crate::ingest::{
-    Bins, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins, read_soup,
-    settle,
+    Bins, Converted, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins,
+    read_soup, settle,
 };
-use crate::io::{ReadOptions, check_output};
-use crate::mesh::{CornerForm, SinkFile, SinkStats};
+use crate::io::{Format, IoError, ReadOptions, check_output};
+use crate::mesh::{CornerForm, LengthUnit, MeshSink, MeshSource, SinkFile, SinkStats};
 use crate::monitor::{Counter, Monitor};
 use crate::octree::{Domain, Flips};
 use crate::patch::{PatchStats, patch};
@@ -23,15 +27,17 @@ use crate::repair::deeper::DepthTrial;
 use crate::repair::depth::choose_domain;
 use crate::repair::finish::broken_promises;
 use crate::repair::length::Ruler;
+use crate::repair::measuring::SAMPLES;
 use crate::repair::outcome::Outcome;
-use crate::repair::run::Run;
+use crate::repair::run::{Feed, Run};
+use crate::repair::settings::Settings;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
 use crate::sign::{FillRule, FloodStats, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, StoreError};
 use crate::transfer::{BORDERS, BorderStats};
-use crate::verify::{Outward, Proof, ProofOptions, Vertices, prove};
+use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
 
 /// A level of detail whose file is in its place.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -80,6 +86,9 @@ pub struct Findings {
     pub(crate) lost_maps: Vec<String>,
     pub written: SinkStats,
     pub proof: Option<Proof>,
+    /// How far the written file lies from the soup.
+    #[serde(default)]
+    pub deviation: Option<Deviation>,
     /// The levels before the one under way.
     pub finished: Vec<FinishedLevel>,
 }
@@ -164,6 +173,7 @@ impl Run<'_> {
             Step::Draw => self.draw(workspace, findings, handles, resources)?,
             Step::Write => self.write(workspace, findings, handles, resources)?,
             Step::Prove => self.prove(workspace, findings, resources)?,
+            Step::Measure => self.measure(workspace, findings, resources)?,
         };
         self.recording.end(step.stage());
         Ok(files)
@@ -192,6 +202,10 @@ impl Run<'_> {
             Step::Write => 2 * findings.sign.bricks,
             // Read once, and joined once.
             Step::Prove => 2 * findings.written.triangles,
+            Step::Measure if self.settings.deviation => {
+                findings.soup().stats.triangles + findings.written.triangles + 2 * SAMPLES
+            }
+            Step::Measure => 0,
         }
     }
 
@@ -200,13 +214,29 @@ impl Run<'_> {
         findings: &mut Findings,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        let options = ReadOptions { share_bytes: resources.share_bytes };
-        let mut source =
-            crate::io::open(self.input, resources.scratch, &options).map_err(RepairError::Input)?;
-        let mut soup = read_soup(&mut *source, self.settings.strict, self.takes(), resources)
-            .map_err(|e| RepairError::from_ingest(e, self.input))?;
-        // What the reader holds of the share is free from here on.
-        drop(source);
+        let mut soup = match &self.feed {
+            Feed::File => {
+                let options = ReadOptions::in_scene(resources.share_bytes);
+                let source = crate::io::open(self.input, resources.scratch, &options);
+                // What the reader holds of the share is free once it is read.
+                let mut source = source.map_err(RepairError::Input)?;
+                let Settings { unit, to_unit, .. } = self.settings;
+                let soup =
+                    self.read_from(&mut Converted::new(&mut *source, unit, to_unit), resources)?;
+                check_converted(self.input, to_unit, soup.facts.unit)?;
+                soup
+            }
+            Feed::Placed { of } => {
+                let mut parts = of.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut source = parts.placed(resources)?;
+                self.read_from(&mut source, resources)?
+            }
+            Feed::Part { of, number, name } => {
+                let mut parts = of.lock().unwrap_or_else(PoisonError::into_inner);
+                let mut source = parts.part(*number, name)?;
+                self.read_from(&mut source, resources)?
+            }
+        };
         soup.part_looks(resources).map_err(RepairError::Input)?;
         self.check_unchanged()?;
         findings.soup = Some(soup.facts);
@@ -215,7 +245,8 @@ impl Run<'_> {
         }
         let (settings, ruler) = (&self.settings, self.ruler(findings));
         let thickness = settings.sheet_thickness;
-        let domain = choose_domain(self.input, &ruler, settings.depth, thickness, self.format)?;
+        let (depth, format) = (settings.depth, self.format);
+        let domain = choose_domain(self.input, &ruler, depth, thickness, format, self.finest)?;
         if self.levels().iter().any(|level| level.decimate.in_cells(&ruler, &domain).is_none()) {
             return Err(RepairError::NoUnit { path: self.input.to_path_buf() });
         }
@@ -224,13 +255,26 @@ impl Run<'_> {
         Ok(soup.files())
     }
 
+    /// Reads a source to its end.
+    fn read_from<S: MeshSource<Error = IoError> + ?Sized>(
+        &self,
+        source: &mut S,
+        resources: &Resources,
+    ) -> Result<Soup, RepairError> {
+        read_soup(source, self.settings.strict, self.takes(), resources)
+            .map_err(|e| RepairError::from_ingest(e, self.input))
+    }
+
     fn bin(
         &self,
         workspace: &Workspace,
         findings: &mut Findings,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        self.keep_images(workspace, findings)?;
+        // Images of parts belong to the whole.
+        if matches!(self.feed, Feed::File) {
+            self.keep_images(workspace, findings)?;
+        }
         let soup = Soup::open(resources, &workspace.files(), *findings.soup())?;
         let (bins, measure) = fill_bins(&soup, findings.domain(), resources)?;
         findings.measure = measure;
@@ -388,18 +432,7 @@ impl Run<'_> {
         };
         let mut sink = sink.map_err(RepairError::Output)?;
         findings.is_split = sink.corner_form() == CornerForm::OfVertices;
-        if is_painted {
-            self.paint(workspace, findings, &mut *sink, resources)?;
-        } else {
-            let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
-            let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
-            let placed = (&findings.placed, start);
-            let (domain, options) = (findings.domain(), self.contour_options(findings));
-            findings.contour =
-                write_surface((cells, surface), domain, &options, placed, &mut *sink, resources)
-                    .map_err(RepairError::from_write)?;
-        }
-        (handles.cells, handles.surface) = (None, None);
+        self.write_into(workspace, findings, (handles, start), &mut *sink, resources)?;
         let written = sink.finish().map_err(RepairError::Output)?;
         self.recording.count(Counter::OutputBytesWritten, written.file.bytes);
         findings.written = written;
@@ -411,6 +444,30 @@ impl Run<'_> {
         }])
     }
 
+    /// Hands the surface to a sink, from its start or from where an earlier run was.
+    pub(crate) fn write_into<S: MeshSink<Error = IoError> + ?Sized>(
+        &self,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        (handles, start): (&mut Handles, Option<WriteProgress>),
+        sink: &mut S,
+        resources: &Resources,
+    ) -> Result<(), RepairError> {
+        if self.attributes(findings).any() {
+            self.paint(workspace, findings, sink, resources)?;
+        } else {
+            let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
+            let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
+            let placed = (&findings.placed, start);
+            let (domain, options) = (findings.domain(), self.contour_options(findings));
+            findings.contour =
+                write_surface((cells, surface), domain, &options, placed, sink, resources)
+                    .map_err(RepairError::from_write)?;
+        }
+        (handles.cells, handles.surface) = (None, None);
+        Ok(())
+    }
+
     fn prove(
         &self,
         workspace: &Workspace,
@@ -419,8 +476,28 @@ impl Run<'_> {
     ) -> Result<Vec<FileState>, RepairError> {
         // A coordinate may change and the surface stay sound: so the bytes are checked as well.
         check_output(workspace.part(), &findings.written.file, resources.scratch)?;
-        let options = ReadOptions { share_bytes: resources.share_bytes / 4 };
-        let mut open = || crate::io::open(workspace.part(), resources.scratch, &options);
+        let share_bytes = resources.share_bytes / 4;
+        let options = match self.format {
+            // Nodes say what a unit is; numbers are proved as they were written.
+            Format::Glb => ReadOptions::by_itself(share_bytes),
+            _ => ReadOptions::in_scene(share_bytes),
+        };
+        let mut open = || {
+            crate::io::open(workspace.part(), resources.scratch, &options)
+                .map(|source| source as ProvedSource<'static, IoError>)
+        };
+        self.prove_source(&mut open, workspace, findings, resources)?;
+        Ok(Vec::new())
+    }
+
+    /// Proves what `open` gives: the whole file, or what it has of one part.
+    pub(crate) fn prove_source(
+        &self,
+        open: &mut dyn FnMut() -> Result<ProvedSource<'static, IoError>, IoError>,
+        workspace: &Workspace,
+        findings: &mut Findings,
+        resources: &Resources,
+    ) -> Result<(), RepairError> {
         let outward = match self.settings.fill_rule {
             // What lies behind panes is a hollow.
             FillRule::Solid if !findings.has_panes() => Outward::AllPositive,
@@ -429,17 +506,30 @@ impl Run<'_> {
         let vertices = if findings.is_split { Vertices::Positions } else { Vertices::Numbers };
         let share_bytes = resources.share_bytes / 2;
         let proof_options = ProofOptions { share_bytes, outward, vertices, intersections: true };
-        let proof =
-            prove(&mut open, resources.scratch, &proof_options, resources.pool, &self.recording)
-                .map_err(RepairError::from_verify)?;
+        let proof = prove(open, resources.scratch, &proof_options, resources.pool, self.recording)
+            .map_err(RepairError::from_verify)?;
         // What other methods do not promise is no bug: the outcome tells it.
         let failures = broken_promises(&proof);
         if failures.is_empty() || self.settings.method.caveat().is_some() {
             findings.proof = Some(proof);
-            return Ok(Vec::new());
+            return Ok(());
         }
         let folder = workspace.folder().to_path_buf();
         Err(RepairError::ProofFailed { failures: failures.join("; "), folder })
+    }
+}
+
+/// Refuses numbers that should have been turned into another unit and were not.
+pub(crate) fn check_converted(
+    input: &Path,
+    to: Option<LengthUnit>,
+    found: Option<LengthUnit>,
+) -> Result<(), RepairError> {
+    match to {
+        Some(to) if found != Some(to) => {
+            Err(RepairError::NothingToConvert { path: input.to_path_buf() })
+        }
+        _ => Ok(()),
     }
 }
 

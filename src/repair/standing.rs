@@ -6,7 +6,8 @@ use serde::de::IgnoredAny;
 use crate::bridge;
 use crate::contour::LOOKS;
 use crate::hidden;
-use crate::io::ASIDE;
+use crate::ingest::SCATTERED;
+use crate::io::{ASIDE, NODES, SEEN_NODES};
 use crate::mesh::SinkFile;
 use crate::repair::step::{OUTPUT_PART, Step};
 use crate::sign;
@@ -15,7 +16,7 @@ use crate::store::Manifest;
 /// The manifest.
 pub const MANIFEST: &str = "manifest";
 /// Files that live within one step.
-pub const PASSING: [&str; 16] = [
+pub const PASSING: [&str; 24] = [
     "facts.spool",
     bridge::PASSING[0],
     bridge::PASSING[1],
@@ -30,9 +31,21 @@ pub const PASSING: [&str; 16] = [
     sign::PASSING[2],
     ASIDE[0],
     ASIDE[1],
+    ASIDE[2],
     LOOKS[0],
     LOOKS[1],
+    SCATTERED,
+    NODES[0],
+    NODES[1],
+    SEEN_NODES[0],
+    SEEN_NODES[1],
+    FOUND,
+    CONCLUDED,
 ];
+/// What was found out about the parts so far.
+pub const FOUND: &str = "found.spool";
+/// What came of the parts so far.
+pub const CONCLUDED: &str = "concluded.spool";
 /// The manifest on its way to its name.
 pub const MANIFEST_NEW: &str = "manifest.new";
 

@@ -53,11 +53,13 @@ pub enum Step {
     Write,
     /// The written file is proved.
     Prove,
+    /// It is compared with the soup.
+    Measure,
 }
 
 impl Step {
     /// All steps.
-    pub const ALL: [Self; 15] = [
+    pub const ALL: [Self; 16] = [
         Self::Read,
         Self::Bin,
         Self::Settle,
@@ -73,6 +75,7 @@ impl Step {
         Self::Draw,
         Self::Write,
         Self::Prove,
+        Self::Measure,
     ];
 
     /// Its name in the manifest.
@@ -93,6 +96,7 @@ impl Step {
             Self::Draw => "draw",
             Self::Write => "write",
             Self::Prove => "prove",
+            Self::Measure => "measure",
         }
     }
 
@@ -108,6 +112,7 @@ impl Step {
                 Stage::Contour
             }
             Self::Prove => Stage::Verify,
+            Self::Measure => Stage::Deviate,
         }
     }
 
@@ -127,7 +132,7 @@ impl Step {
             Self::Separate => &[SURFACE],
             Self::Draw => &DRAWN,
             Self::Write => &[OUTPUT_PART],
-            Self::Choose | Self::Prove => &[],
+            Self::Choose | Self::Prove | Self::Measure => &[],
         }
     }
 
@@ -161,7 +166,7 @@ impl Step {
             ],
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, BORDERS],
             // With what later steps of every level read that is there by now.
-            Self::Choose => &[SIGNS, ATTRIBUTES, ORIGINS, SLAB_ORIGINS],
+            Self::Choose => &[SIGNS, SOUP, ATTRIBUTES, ORIGINS, SLAB_ORIGINS],
             Self::Place => &[SIGNS],
             Self::Separate => &[SIGNS, CELLS],
             Self::Draw => &[CELLS, SURFACE, ORIGINS, SLAB_ORIGINS],
@@ -178,6 +183,7 @@ impl Step {
                 IMAGES,
             ],
             Self::Prove => &[OUTPUT_PART, LOOK_MATERIALS, MATERIALS, IMAGES],
+            Self::Measure => &[SOUP, OUTPUT_PART, LOOK_MATERIALS, MATERIALS, IMAGES],
         }
     }
 

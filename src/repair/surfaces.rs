@@ -12,7 +12,7 @@ use crate::io::{
 use crate::repair::RepairError;
 use crate::repair::outcome::TransferReport;
 use crate::repair::run::Run;
-use crate::repair::settings::NormalRule;
+use crate::repair::settings::{NormalRule, TextureRule};
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
 use crate::store::FileState;
@@ -42,10 +42,7 @@ impl Run<'_> {
             (soup.has_colours && !attributes.colours, "colours of vertices"),
             (soup.has_normals && wants_normals && !attributes.normals, "normals"),
             (soup.parts > 1, "names of parts"),
-            (
-                self.ruler(findings).unit.is_some_and(|unit| !self.format.holds_unit(unit)),
-                "the unit",
-            ),
+            (self.ruler(findings).unit.is_some() && !self.format.holds_unit(), "the unit"),
         ];
         let lost = lost.iter().filter(|(is_lost, _)| *is_lost);
         let lost = lost.map(|(_, what)| (*what).to_owned());
@@ -84,6 +81,8 @@ impl Run<'_> {
             palette,
             tag_patches: self.settings.tag_patches,
             attributes: self.attributes(findings),
+            scene: None,
+            copies_images: self.settings.textures == TextureRule::Copy,
             output: workspace.output_path(),
             unit,
             library,
@@ -110,33 +109,65 @@ impl Run<'_> {
         let mut options = self.write_options(workspace, findings)?;
         for level in &self.levels()[findings.finished.len()..] {
             options.output.clone_from(&level.output);
-            self.each_image_to_put(&options, workspace, |_| Ok(()))?;
+            Beside { format: self.format, options: &options, workspace }.keep_images()?;
         }
         Ok(())
     }
 
-    /// Puts the images that the output names, and the input has inside, beside the output.
-    pub(crate) fn put_images(
+    /// Puts images and the library of the output beside it.
+    pub(crate) fn put_beside(
         &self,
         workspace: &Workspace,
         findings: &Findings,
     ) -> Result<(), RepairError> {
         let options = self.write_options(workspace, findings)?;
+        Beside { format: self.format, options: &options, workspace }.put()
+    }
+}
+
+/// What lies beside an output and belongs to it.
+#[derive(Clone, Copy)]
+pub struct Beside<'o> {
+    pub format: Format,
+    pub options: &'o WriteOptions,
+    pub workspace: &'o Workspace,
+}
+
+impl Beside<'_> {
+    /// Refuses an output whose images would replace others.
+    ///
+    /// # Errors
+    /// [`RepairError::ForeignLibrary`].
+    pub fn keep_images(self) -> Result<(), RepairError> {
+        self.each_image_to_put(|_| Ok(()))
+    }
+
+    /// Puts the images that the output names, and the input has inside, beside the output; and the
+    /// material library of an OBJ file.
+    ///
+    /// # Errors
+    /// [`RepairError::ForeignLibrary`], or they cannot be written.
+    pub fn put(self) -> Result<(), RepairError> {
+        let Self { format, options, workspace } = self;
         let scratch = workspace.scratch();
-        self.each_image_to_put(&options, workspace, |image| {
+        self.each_image_to_put(|image| {
             workspace.put_beside(&image.path, |part| image.write(part, scratch))
-        })
+        })?;
+        let Some(palette) = options.palette.as_ref().filter(|_| format == Format::Obj) else {
+            return Ok(());
+        };
+        let path = workspace.output_path().with_file_name(&options.library);
+        keep_foreign(&path)?;
+        workspace.put_beside(&path, |part| write_library(part, palette, options, scratch))
     }
 
     /// Shows the images that are not in their place yet; what else is there stays.
     fn each_image_to_put(
-        &self,
-        options: &WriteOptions,
-        workspace: &Workspace,
+        self,
         mut visit: impl FnMut(&ImageBeside) -> Result<(), RepairError>,
     ) -> Result<(), RepairError> {
-        let scratch = workspace.scratch();
-        images_beside(self.format, options, scratch, RepairError::Output, |image| {
+        let scratch = self.workspace.scratch();
+        images_beside(self.format, self.options, scratch, RepairError::Output, |image| {
             if image.is_there().map_err(RepairError::Output)? {
                 return Ok(());
             }
@@ -145,22 +176,6 @@ impl Run<'_> {
             }
             visit(image)
         })
-    }
-
-    /// Puts the material library of an OBJ file in its place, before the file.
-    pub(crate) fn put_library(
-        &self,
-        workspace: &Workspace,
-        findings: &Findings,
-    ) -> Result<(), RepairError> {
-        let options = self.write_options(workspace, findings)?;
-        let Some(palette) = options.palette.as_ref().filter(|_| self.format == Format::Obj) else {
-            return Ok(());
-        };
-        let path = workspace.output_path().with_file_name(&options.library);
-        keep_foreign(&path)?;
-        workspace
-            .put_beside(&path, |part| write_library(part, palette, &options, workspace.scratch()))
     }
 }
 

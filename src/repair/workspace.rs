@@ -28,8 +28,43 @@ use crate::store::{
     load_manifest, save_manifest, sync_folder,
 };
 
+/// What names of the folders of parts begin with.
+const PART_FOLDER: &str = "part-";
+/// Name of the folder in which the whole is looked at.
+const WHOLE_FOLDER: &str = "whole";
 /// Ending of work folders.
 const ENDING: &str = "brickmend";
+
+/// A work folder inside of another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Inner {
+    /// That of the whole model.
+    Whole,
+    /// That of the part with this number.
+    Part(u32),
+}
+
+impl Inner {
+    fn name(self) -> String {
+        match self {
+            Self::Whole => WHOLE_FOLDER.to_owned(),
+            Self::Part(number) => format!("{PART_FOLDER}{number}"),
+        }
+    }
+
+    /// The folder with this name.
+    pub fn named(name: &str) -> Option<Self> {
+        let of_number = |number: &str| number.parse().ok().map(Self::Part);
+        match name {
+            WHOLE_FOLDER => Some(Self::Whole),
+            name => name.strip_prefix(PART_FOLDER).and_then(of_number),
+        }
+    }
+
+    fn is_below(self, count: u32) -> bool {
+        matches!(self, Self::Part(number) if number < count)
+    }
+}
 
 /// A locked work folder.
 pub struct Workspace {
@@ -80,6 +115,33 @@ impl Workspace {
             return Err(RepairError::InputInWorkFolder { path: input.to_path_buf(), folder });
         }
         let scratch = Scratch::limited(&folder, limits.max_disk_bytes.unwrap_or(u64::MAX));
+        Self::begin((folder, lock), outputs, part, scratch, (limits, key))
+    }
+
+    /// The work folder of a part of the model, or the one in which it is looked at as a whole,
+    /// inside of this one. Its disk counts with that of this one.
+    ///
+    /// # Errors
+    /// As [`Workspace::open`].
+    pub fn open_inner(
+        &self,
+        inner: Inner,
+        limits: &Limits,
+        key: [u8; 32],
+    ) -> Result<Self, RepairError> {
+        let folder = self.folder.join(inner.name());
+        let lock = lock_folder(&folder)?;
+        let (part, scratch) = (folder.join(OUTPUT_PART), self.scratch.beside(&folder));
+        Self::begin((folder, lock), self.outputs.clone(), part, scratch, (limits, key))
+    }
+
+    fn begin(
+        (folder, lock): (PathBuf, File),
+        outputs: Vec<PathBuf>,
+        part: PathBuf,
+        scratch: Scratch,
+        (limits, key): (&Limits, [u8; 32]),
+    ) -> Result<Self, RepairError> {
         let workspace = Self {
             folder,
             outputs,
@@ -92,6 +154,43 @@ impl Workspace {
         };
         workspace.take_over(limits.fresh)?;
         Ok(workspace)
+    }
+
+    /// The folders of ours in this one.
+    fn inner_folders(&self) -> Result<Vec<(Inner, PathBuf)>, StoreError> {
+        let failed = |e| StoreError::io("list", &self.folder, e);
+        let mut found = Vec::new();
+        for entry in std::fs::read_dir(&self.folder).map_err(failed)? {
+            let path = entry.map_err(failed)?.path();
+            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
+            if let Some(inner) = Inner::named(name).filter(|_| path.is_dir()) {
+                found.push((inner, path));
+            }
+        }
+        Ok(found)
+    }
+
+    /// Removes those folders of ours in this one that are no longer wanted.
+    fn remove_inner(&self, is_wanted: impl Fn(Inner) -> bool) -> Result<(), StoreError> {
+        for (inner, folder) in self.inner_folders()? {
+            if !is_wanted(inner) {
+                for name in all_names() {
+                    self.scratch.remove_at(&folder.join(name))?;
+                    self.scratch.remove_at(&folder.join(directory_name(name)))?;
+                }
+                let _ = std::fs::remove_file(folder.join(LOCK));
+                let _ = std::fs::remove_dir(&folder);
+            }
+        }
+        Ok(())
+    }
+
+    /// Forgets parts of an earlier run beyond those that there are.
+    ///
+    /// # Errors
+    /// The folder cannot be read or written.
+    pub fn keep_parts(&self, count: u32) -> Result<(), StoreError> {
+        self.remove_inner(|inner| inner == Inner::Whole || inner.is_below(count))
     }
 
     /// Takes over what an earlier run left, as far as it is of use.
@@ -351,6 +450,7 @@ impl Workspace {
     /// Removes the folder and all that is ours in it.
     pub fn remove(self) {
         // A leftover folder is ugly, not wrong: the next run sweeps it.
+        let _ = self.remove_inner(|_| false);
         for name in all_names() {
             let _ = self.remove_file(name);
         }

@@ -44,7 +44,7 @@ pub use sequence::{Sequence, SequencePeek};
 pub use sort::{Record, Sorted, Sorter};
 pub use spool::{Spool, SpoolPeek, SpoolReader, SpoolWriter};
 pub use table::Table;
-pub use texts::{Texts, TextsWriter};
+pub use texts::{NumberedTexts, Texts, TextsWriter};
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.

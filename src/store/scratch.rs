@@ -21,10 +21,16 @@ pub struct Scratch {
 #[derive(Debug)]
 struct Inner {
     folder: PathBuf,
+    next_name: AtomicU64,
+    counters: Arc<Counters>,
+}
+
+/// What all folders of a run took together.
+#[derive(Debug, Default)]
+struct Counters {
     limit_bytes: u64,
     held_bytes: AtomicU64,
     peak_bytes: AtomicU64,
-    next_name: AtomicU64,
     read_bytes: AtomicU64,
     written_bytes: AtomicU64,
     spilled_runs: AtomicU64,
@@ -40,16 +46,18 @@ impl Scratch {
     /// Scratch files under `folder` that take at most `limit_bytes` of the disk, all together.
     #[must_use]
     pub fn limited(folder: &Path, limit_bytes: u64) -> Self {
-        let inner = Inner {
-            folder: folder.to_path_buf(),
-            limit_bytes,
-            held_bytes: AtomicU64::new(0),
-            peak_bytes: AtomicU64::new(0),
-            next_name: AtomicU64::new(0),
-            read_bytes: AtomicU64::new(0),
-            written_bytes: AtomicU64::new(0),
-            spilled_runs: AtomicU64::new(0),
-        };
+        let counters = Arc::new(Counters { limit_bytes, ..Counters::default() });
+        Self::counted(folder, counters)
+    }
+
+    /// Scratch files under another folder, which count together with those under this one.
+    #[must_use]
+    pub fn beside(&self, folder: &Path) -> Self {
+        Self::counted(folder, Arc::clone(&self.inner.counters))
+    }
+
+    fn counted(folder: &Path, counters: Arc<Counters>) -> Self {
+        let inner = Inner { folder: folder.to_path_buf(), next_name: AtomicU64::new(0), counters };
         Self { inner: Arc::new(inner) }
     }
 
@@ -179,8 +187,8 @@ impl Scratch {
     /// Counts what an earlier run left at `path`.
     pub fn adopt(&self, path: &Path) {
         let len = std::fs::metadata(path).map_or(0, |file| file.len());
-        let held = self.inner.held_bytes.fetch_add(len, Ordering::Relaxed) + len;
-        self.inner.peak_bytes.fetch_max(held, Ordering::Relaxed);
+        let held = self.inner.counters.held_bytes.fetch_add(len, Ordering::Relaxed) + len;
+        self.inner.counters.peak_bytes.fetch_max(held, Ordering::Relaxed);
     }
 
     /// Takes `bytes` of the disk.
@@ -188,13 +196,13 @@ impl Scratch {
     /// # Errors
     /// [`StoreError::DiskLimit`].
     pub(crate) fn charge(&self, bytes: u64) -> Result<(), StoreError> {
-        let held = self.inner.held_bytes.fetch_add(bytes, Ordering::Relaxed) + bytes;
-        let limit_bytes = self.inner.limit_bytes;
+        let held = self.inner.counters.held_bytes.fetch_add(bytes, Ordering::Relaxed) + bytes;
+        let limit_bytes = self.inner.counters.limit_bytes;
         if held > limit_bytes {
             self.release(bytes);
             return Err(StoreError::DiskLimit { needed_bytes: held, limit_bytes });
         }
-        self.inner.peak_bytes.fetch_max(held, Ordering::Relaxed);
+        self.inner.counters.peak_bytes.fetch_max(held, Ordering::Relaxed);
         Ok(())
     }
 
@@ -202,46 +210,47 @@ impl Scratch {
     pub(crate) fn release(&self, bytes: u64) {
         // What was there before this run began may go without having been counted.
         let less = |held: u64| Some(held.saturating_sub(bytes));
-        let _ = self.inner.held_bytes.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
+        let _ =
+            self.inner.counters.held_bytes.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
     }
 
     /// Adds to the bytes written.
     pub fn count_written(&self, bytes: u64) {
-        self.inner.written_bytes.fetch_add(bytes, Ordering::Relaxed);
+        self.inner.counters.written_bytes.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// Adds to the bytes read.
     pub fn count_read(&self, bytes: u64) {
-        self.inner.read_bytes.fetch_add(bytes, Ordering::Relaxed);
+        self.inner.counters.read_bytes.fetch_add(bytes, Ordering::Relaxed);
     }
 
     /// Adds one spilled sort run.
     pub fn count_spill(&self) {
-        self.inner.spilled_runs.fetch_add(1, Ordering::Relaxed);
+        self.inner.counters.spilled_runs.fetch_add(1, Ordering::Relaxed);
     }
 
     /// Bytes read so far.
     #[must_use]
     pub fn read_bytes(&self) -> u64 {
-        self.inner.read_bytes.load(Ordering::Relaxed)
+        self.inner.counters.read_bytes.load(Ordering::Relaxed)
     }
 
     /// Bytes written so far.
     #[must_use]
     pub fn written_bytes(&self) -> u64 {
-        self.inner.written_bytes.load(Ordering::Relaxed)
+        self.inner.counters.written_bytes.load(Ordering::Relaxed)
     }
 
     /// Sort runs that went to disk so far.
     #[must_use]
     pub fn spilled_runs(&self) -> u64 {
-        self.inner.spilled_runs.load(Ordering::Relaxed)
+        self.inner.counters.spilled_runs.load(Ordering::Relaxed)
     }
 
     /// The most that all files took of the disk at one time.
     #[must_use]
     pub fn peak_bytes(&self) -> u64 {
-        self.inner.peak_bytes.load(Ordering::Relaxed)
+        self.inner.counters.peak_bytes.load(Ordering::Relaxed)
     }
 }
 

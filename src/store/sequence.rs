@@ -42,6 +42,12 @@ impl<R: Pod> Sequence<R> {
         self.len() == 0
     }
 
+    /// Whether all records are in memory.
+    #[must_use]
+    pub fn is_resident(&self) -> bool {
+        self.file.is_none()
+    }
+
     /// Appends a record.
     ///
     /// # Errors

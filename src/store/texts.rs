@@ -1,10 +1,10 @@
-//! Texts of any length in a spool of bytes, in order.
+//! Texts of any length in a spool of bytes, in order or by number.
 //!
 //! In:         texts. Out: of each its length (4 bytes, the lowest first) and its bytes.
-//! Memory:     a block of the spool, and one text.
+//! Memory:     a block of the spool, and one text; by number 16 bytes a text, spilled beyond a share.
 //! Fails:      as spools do; [`StoreError::Damaged`] where the spool ends within a text.
 
-use crate::store::{FileState, Scratch, Spool, SpoolPeek, SpoolWriter, StoreError};
+use crate::store::{FileState, Scratch, Spool, SpoolPeek, SpoolWriter, StoreError, Table};
 
 /// Appends texts.
 pub struct TextsWriter {
@@ -73,5 +73,85 @@ impl<'s> Texts<'s> {
             let FileState { name, len_bytes, .. } = self.spool.state();
             StoreError::damaged(name.as_ref(), *len_bytes, "the rest of a text", "the end")
         })
+    }
+}
+
+/// Texts by their numbers in the spool.
+pub struct NumberedTexts {
+    spool: Spool<u8>,
+    /// Where the bytes of each begin, and how many there are.
+    places: Table<[u64; 2]>,
+}
+
+impl NumberedTexts {
+    /// Opens the spool that `state` tells of, and looks where its texts are.
+    ///
+    /// # Errors
+    /// It is missing or damaged.
+    pub fn open(
+        scratch: &Scratch,
+        state: &FileState,
+        share_bytes: u64,
+    ) -> Result<Self, StoreError> {
+        let spool = Spool::open(scratch, state)?;
+        let mut places = Table::new(scratch, share_bytes);
+        let mut bytes = SpoolPeek::new(&spool);
+        let mut at = 0;
+        while at < spool.len() {
+            bytes.pass_to(at);
+            let mut length = [0; LENGTH_BYTES as usize];
+            for byte in &mut length {
+                *byte = bytes.next()?.unwrap_or_default();
+            }
+            let length = u64::from(u32::from_le_bytes(length));
+            places.push([at + LENGTH_BYTES, length])?;
+            at += LENGTH_BYTES + length;
+        }
+        Ok(Self { spool, places })
+    }
+
+    /// How many there are.
+    #[must_use]
+    pub fn len(&self) -> u64 {
+        self.places.len()
+    }
+
+    /// Whether there is none.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The text with this number.
+    ///
+    /// # Errors
+    /// The spool is damaged.
+    pub fn get(&mut self, number: u64) -> Result<String, StoreError> {
+        let [first, length] = self.places.get(number)?;
+        let mut text = Vec::new();
+        self.spool.read(first, length as usize, &mut text)?;
+        Ok(String::from_utf8_lossy(&text).into_owned())
+    }
+}
+
+/// In front of each text.
+const LENGTH_BYTES: u64 = 4;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn texts_are_found_by_number() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let mut writer = TextsWriter::create(&scratch, "texts").expect("a spool");
+        let text = |number: usize| "ab\u{e9}".repeat(number % 7 * number);
+        (0..300).try_for_each(|number| writer.push(&text(number))).expect("pushed");
+        let spool = writer.finish().expect("finished");
+        let mut texts = NumberedTexts::open(&scratch, spool.state(), 64).expect("opened");
+        for number in [299, 0, 7, 1, 150] {
+            assert_eq!(texts.get(number as u64).expect("there"), text(number));
+        }
     }
 }

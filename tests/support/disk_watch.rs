@@ -8,7 +8,7 @@ use brickmend::monitor::{Monitor, Stage};
 
 /// What each stage still needs of the files that a folder holds, and what it writes. A file that
 /// no later step reads may be there or not: it does not count.
-const NEEDED: [(Stage, &[&str]); 7] = [
+const NEEDED: [(Stage, &[&str]); 8] = [
     (Stage::Ingest, &["soup", "attributes", "bins", "drops", "facts"]),
     (
         Stage::Bridge,
@@ -20,8 +20,9 @@ const NEEDED: [(Stage, &[&str]); 7] = [
         Stage::Sign,
         &["soup", "attributes", "bins", "leftout", "added", "hits", "flips", "even", "signs"],
     ),
-    (Stage::Contour, &["attributes", "hits", "flips", "signs", "cells", "output"]),
-    (Stage::Verify, &["attributes", "cells", "output"]),
+    (Stage::Contour, &["soup", "attributes", "hits", "flips", "signs", "cells", "output"]),
+    (Stage::Verify, &["soup", "attributes", "cells", "output"]),
+    (Stage::Deviate, &["soup", "attributes", "output"]),
 ];
 
 /// Watches a folder while a repair works in it.

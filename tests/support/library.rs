@@ -1,7 +1,5 @@
 //! A folder of models and one of results, for tests of batches from outside.
 
-#![allow(dead_code, reason = "each test file uses its own part")]
-
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
 use std::fmt::Write;

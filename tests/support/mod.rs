@@ -1,10 +1,10 @@
 //! What the tests of whole repairs share: soups, ways to break them, files, and judgement.
 
-#![allow(dead_code, reason = "each test file uses its own part")]
-
 pub mod breakage;
 pub mod disk_watch;
 pub mod image;
+pub mod library;
+pub mod page;
 pub mod program;
 pub mod run;
 pub mod schema;

@@ -36,7 +36,7 @@ impl Surface {
         let vertices = if is_split { Vertices::Positions } else { Vertices::Numbers };
         let options =
             ProofOptions { share_bytes: 16 << 20, outward, vertices, intersections: true };
-        let read = ReadOptions { share_bytes: 16 << 20 };
+        let read = ReadOptions::in_scene(16 << 20);
         let mut open = || -> Result<ProvedSource<_>, brickmend::io::IoError> {
             brickmend::io::open(path, &scratch, &read)
         };

@@ -38,7 +38,7 @@ fn folder() -> TempDir {
 
 /// Reads the model at `path` to its end or to its first error.
 fn read(path: &Path, scratch: &Scratch) {
-    let options = ReadOptions { share_bytes: 96 << 10 };
+    let options = ReadOptions::in_scene(96 << 10);
     let mut source = match brickmend::io::open(path, scratch, &options) {
         Ok(source) => source,
         Err(error) => return assert!(error.is_input(), "{error}"),

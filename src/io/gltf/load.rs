@@ -19,9 +19,10 @@ use crate::io::gltf::schema::{
     Texture,
 };
 use crate::io::gltf::text::{Segments, Text};
-use crate::io::gltf::transform::{IDENTITY, from_columns, from_parts};
+use crate::io::gltf::transform::{from_columns, from_parts};
 use crate::io::gltf::triangles::is_triangles;
 use crate::io::input::Input;
+use crate::mesh::IDENTITY;
 use crate::store::Scratch;
 
 /// Extensions that may be required: what they change is read, or is nothing that we read.
@@ -239,7 +240,7 @@ fn add_mesh(model: &mut Model, mesh: Mesh) -> Result<(), IoError> {
         add_primitive(model, primitive)?;
     }
     let name = model.text(mesh.name.as_deref())?;
-    Ok(model.meshes.push(MeshRecord { first, count, name })?)
+    Ok(model.meshes.push(MeshRecord { first, count, name, part: NONE, padding: 0 })?)
 }
 
 fn add_primitive(model: &mut Model, primitive: Primitive) -> Result<(), IoError> {
@@ -305,7 +306,7 @@ fn add_node(model: &mut Model, node: Node) -> Result<(), IoError> {
         name: model.text(node.name.as_deref())?,
         instances,
         is_child: 0,
-        is_visited: 0,
+        visited: 0,
     };
     node.children.0.iter().try_for_each(|&child| model.children.push(child))?;
     Ok(model.nodes.push(record)?)

@@ -5,6 +5,8 @@ mod base64;
 mod buffers;
 mod container;
 mod document;
+mod document_materials;
+mod document_nodes;
 mod draco;
 #[cfg(test)]
 mod draco_tests;
@@ -14,6 +16,7 @@ mod images;
 mod load;
 mod materials;
 mod model;
+mod nodes;
 mod reader;
 mod scene;
 mod schema;

@@ -8,7 +8,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::io::error::{IoError, Place};
 use crate::io::gltf::text::Segments;
-use crate::io::gltf::transform::Affine;
+use crate::mesh::Affine;
 use crate::store::{Dictionary, Scratch, StoreError, Table};
 
 /// The number of what is not there.
@@ -84,6 +84,9 @@ pub(crate) struct MeshRecord {
     pub(crate) first: u64,
     pub(crate) count: u32,
     pub(crate) name: u32,
+    /// The number of the part that it is, where parts are read by themselves, once it was read.
+    pub(crate) part: u32,
+    pub(crate) padding: u32,
 }
 
 /// Triangles of one material.
@@ -113,7 +116,7 @@ pub(crate) struct PrimitiveRecord {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 pub(crate) struct NodeRecord {
-    /// Into its parent; into the scene once it was visited.
+    /// Into its parent; into the scene once it was visited, where parts are read in their places.
     pub(crate) map: Affine,
     pub(crate) first_child: u64,
     pub(crate) child_count: u32,
@@ -122,7 +125,8 @@ pub(crate) struct NodeRecord {
     /// Accessors of the copies' translation, rotation and scale.
     pub(crate) instances: [u32; 3],
     pub(crate) is_child: u32,
-    pub(crate) is_visited: u32,
+    /// One more than its number among those that were visited.
+    pub(crate) visited: u32,
 }
 
 /// A material, as far as it is stated; see [`crate::io::gltf::materials`].

@@ -1,7 +1,8 @@
 //! Streams the triangles of a glTF scene, node by node.
 //!
 //! A part is a node with triangles, also where names repeat; a vertex is numbered anew for every
-//! node, since each puts it elsewhere. Meshes are taken as they are stored: skins, morph targets
+//! node, since each puts it elsewhere. By themselves parts are meshes, each read at the first node
+//! that has it; copies of a mesh within a node are nodes in that one. Meshes are taken as they are stored: skins, morph targets
 //! and animations move nothing. Texture coordinates are turned, so that v goes up. Indices that
 //! lead nowhere are counted, accessors that leave their buffers end the reading. Memory: half of
 //! the share for the objects of the file, a third for blocks of its buffers; see
@@ -14,13 +15,15 @@ use crate::io::gltf::images;
 use crate::io::gltf::load::load;
 use crate::io::gltf::materials;
 use crate::io::gltf::model::{MeshRecord, Model, NONE};
-use crate::io::gltf::scene::{Copies, Walk};
+use crate::io::gltf::nodes::Nodes;
+use crate::io::gltf::scene::{Copies, Visited, Walk};
 use crate::io::gltf::stream::Stream;
-use crate::io::gltf::transform::Affine;
 use crate::io::input::Input;
 use crate::io::polygon::polygon_number;
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
-use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{
+    Affine, Discarded, LengthUnit, Material, MeshSource, Part, Placement, SceneNode, TriangleBatch,
+};
 use crate::store::{Scratch, Table};
 
 /// The node whose mesh is being delivered.
@@ -43,7 +46,9 @@ struct Visit {
 pub(crate) struct GltfReader {
     model: Model,
     buffers: Buffers,
+    placement: Placement,
     walk: Walk,
+    nodes: Nodes,
     visit: Option<Visit>,
     stream: Option<Stream>,
     /// By part its node, by material its number in the file.
@@ -70,8 +75,11 @@ impl GltfReader {
         let counted_bytes = chunks.json.end - chunks.json.start;
         let mut model = load(&mut input, chunks.json, chunks.is_text, scratch, share / 2)?;
         let buffers = Buffers::new(input, chunks.binary, share / 3);
-        let walk = Walk::new(&mut model, scratch, share / 64)?;
+        let placement = options.placement;
+        let walk = Walk::new(&mut model, scratch, share / 64, placement)?;
         Ok(Self {
+            placement,
+            nodes: Nodes::new(scratch, share / 64),
             model,
             buffers,
             walk,
@@ -125,13 +133,24 @@ impl GltfReader {
 
     /// Goes to the next node with a mesh.
     fn next_visit(&mut self) -> Result<bool, IoError> {
-        let Some((number, node)) = self.walk.next(&mut self.model)? else { return Ok(false) };
+        let Some(visited) = self.walk.next(&mut self.model)? else { return Ok(false) };
+        let is_alone = self.placement == Placement::ByItself;
+        if is_alone {
+            self.nodes.enter(&mut self.model, &mut self.buffers, &visited)?;
+        }
+        let Visited { number, node, .. } = visited;
         if node.mesh == NONE {
             return Ok(true);
         }
         let mesh = self.model.mesh(node.mesh)?;
+        if mesh.part != NONE {
+            return Ok(true);
+        }
         let (first, end) = (mesh.first, mesh.first + u64::from(mesh.count));
-        let mut copies = Copies::new(&mut self.model, &mut self.buffers, (number, &node))?;
+        let mut copies = match is_alone {
+            true => Copies::one(number),
+            false => Copies::new(&mut self.model, &mut self.buffers, (number, &node))?,
+        };
         if let Some(map) = copies.next(&mut self.model, &mut self.buffers)? {
             self.scope += 1;
             let visit = Visit {
@@ -221,6 +240,10 @@ impl GltfReader {
         let part = self.parts.len() as u32;
         visit.part = Some(part);
         self.parts.push(visit.node)?;
+        if self.placement == Placement::ByItself {
+            let mesh = self.model.mesh(visit.mesh)?;
+            self.model.meshes.set(visit.mesh.into(), MeshRecord { part, ..mesh })?;
+        }
         Ok(part)
     }
 
@@ -283,14 +306,20 @@ impl MeshSource for GltfReader {
         }
         let node = self.parts.get(number.into())?;
         let node = self.model.node(node)?;
-        let name = match self.model.text_of(node.name)? {
-            Some(name) => Some(name),
-            None => {
-                let mesh = self.model.mesh(node.mesh)?;
-                self.model.text_of(mesh.name)?
-            }
-        };
-        Ok(Part { name: name.unwrap_or_default() })
+        let mut names = [node.name, self.model.mesh(node.mesh)?.name];
+        if self.placement == Placement::ByItself {
+            names.reverse();
+        }
+        let name = if names[0] == NONE { names[1] } else { names[0] };
+        Ok(Part { name: self.model.text_of(name)?.unwrap_or_default() })
+    }
+
+    fn node_count(&self) -> u64 {
+        self.nodes.len()
+    }
+
+    fn node(&mut self, number: u32) -> Result<Option<SceneNode>, IoError> {
+        self.nodes.get(&mut self.model, number).map(Some)
     }
 
     fn material(&mut self, number: u32) -> Result<Material, IoError> {

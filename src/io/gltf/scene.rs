@@ -1,4 +1,5 @@
-//! The nodes of a scene, parents before their children, each with its map into the scene.
+//! The nodes of a scene, parents before their children, each with its map into the scene, or into
+//! its parent.
 //!
 //! A node that is reached twice, by two parents or in a circle, is refused: glTF has trees only.
 //! Memory: the share for the nodes still to come.
@@ -7,7 +8,8 @@ use crate::io::error::IoError;
 use crate::io::gltf::accessor::{Demand, Field};
 use crate::io::gltf::buffers::Buffers;
 use crate::io::gltf::model::{Model, NONE, NodeRecord};
-use crate::io::gltf::transform::{Affine, compose, from_parts, is_finite};
+use crate::io::gltf::transform::{from_parts, is_finite};
+use crate::mesh::{Affine, IDENTITY, Placement, compose};
 use crate::store::{Scratch, Table};
 
 /// What places copies of a mesh in its node.
@@ -15,8 +17,18 @@ const SHIFTS: Demand =
     Demand { what: "three numbers in an element", lanes: [3, 3], is_index: false, is_part: false };
 const TURNS: Demand = Demand { what: "four numbers in an element", lanes: [4, 4], ..SHIFTS };
 
+/// A node on the way.
+pub(crate) struct Visited {
+    /// Its number in the file.
+    pub(crate) number: u32,
+    pub(crate) node: NodeRecord,
+    /// The number in the file of its parent, or none.
+    pub(crate) parent: u32,
+}
+
 /// Walks the nodes.
 pub(crate) struct Walk {
+    placement: Placement,
     /// Nodes to come with their parents, the next one on top.
     stack: Table<[u32; 2]>,
     height: u64,
@@ -30,9 +42,10 @@ impl Walk {
         model: &mut Model,
         scratch: &Scratch,
         share_bytes: u64,
+        placement: Placement,
     ) -> Result<Self, IoError> {
         let stack = Table::new(scratch, share_bytes);
-        let mut walk = Self { stack, height: 0, visited: 0, is_whole: false };
+        let mut walk = Self { placement, stack, height: 0, visited: 0, is_whole: false };
         let scene = match model.scene {
             NONE if model.scenes.is_empty() => {
                 walk.begin_everywhere(model)?;
@@ -89,8 +102,9 @@ impl Walk {
         Ok(())
     }
 
-    /// The next node; its map leads into the scene.
-    pub(crate) fn next(&mut self, model: &mut Model) -> Result<Option<(u32, NodeRecord)>, IoError> {
+    /// The next node; its map leads into the scene, or into its parent where parts are by
+    /// themselves.
+    pub(crate) fn next(&mut self, model: &mut Model) -> Result<Option<Visited>, IoError> {
         let Some(top) = self.height.checked_sub(1) else {
             if self.is_whole && self.visited < model.nodes.len() {
                 let expected = "nodes that descend from one without a parent";
@@ -102,21 +116,21 @@ impl Walk {
         self.height = top;
         let [number, parent] = self.stack.get(top)?;
         let mut node = model.node(number)?;
-        if node.is_visited != 0 {
+        if node.visited != 0 {
             let found = "another one, or itself";
             return Err(model.wrong(("node", number), "a node with one parent", found));
         }
-        if parent != NONE {
+        if parent != NONE && self.placement == Placement::InScene {
             node.map = compose(&model.node(parent)?.map, &node.map);
         }
         if !is_finite(&node.map) {
             return Err(model.wrong(("node", number), "a finite transform", "an infinite one"));
         }
-        node.is_visited = 1;
         self.visited += 1;
+        node.visited = self.visited as u32;
         model.nodes.set(number.into(), node)?;
         self.push(model, node.first_child, node.child_count.into(), number)?;
-        Ok(Some((number, node)))
+        Ok(Some(Visited { number, node, parent }))
     }
 }
 
@@ -156,6 +170,21 @@ impl Copies {
         Ok(Self { node: number, map: node.map, fields, count, next: 0 })
     }
 
+    /// One copy, where its mesh is.
+    pub(crate) fn one(node: u32) -> Self {
+        Self { node, map: IDENTITY, fields: [None; 3], count: 1, next: 0 }
+    }
+
+    /// The same copies in the coordinates of their node.
+    pub(crate) fn in_node(self) -> Self {
+        Self { map: IDENTITY, ..self }
+    }
+
+    /// Whether the node says where its copies are.
+    pub(crate) fn are_placed(&self) -> bool {
+        self.fields.iter().any(Option::is_some)
+    }
+
     /// The map of the next copy into the scene.
     pub(crate) fn next(
         &mut self,
@@ -172,7 +201,7 @@ impl Copies {
             }
         }
         self.next += 1;
-        if self.fields.iter().all(Option::is_none) {
+        if !self.are_placed() {
             return Ok(Some(self.map));
         }
         let [[x, y, z, _], rotation, [a, b, c, _]] = parts;

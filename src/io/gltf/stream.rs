@@ -6,10 +6,10 @@ use crate::io::gltf::buffers::Buffers;
 use crate::io::gltf::draco::decode;
 use crate::io::gltf::materials;
 use crate::io::gltf::model::{Model, NONE};
-use crate::io::gltf::transform::{Affine, IDENTITY, apply, mirrors};
 use crate::io::gltf::triangles::Mode;
 use crate::io::polygon::WHITE;
 use crate::mesh::TriangleBatch;
+use crate::mesh::{Affine, IDENTITY, apply, mirrors};
 
 const POSITIONS: Demand =
     Demand { what: "three numbers in an element", lanes: [3, 3], is_index: false, is_part: false };

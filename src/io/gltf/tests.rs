@@ -342,7 +342,7 @@ fn text_with_buffers_beside_it_or_in_it_reads_like_glb() {
 pub(crate) fn read_file(path: &Path, share_bytes: u64) -> Result<Content, IoError> {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let scratch = Scratch::new(folder.path());
-    read_all(open(path, &scratch, &ReadOptions { share_bytes })?.as_mut())
+    read_all(open(path, &scratch, &ReadOptions::in_scene(share_bytes))?.as_mut())
 }
 
 #[test]

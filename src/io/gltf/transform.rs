@@ -1,10 +1,6 @@
 //! Affine maps: where a node puts its mesh.
 
-/// Rows of three columns and a shift.
-pub(crate) type Affine = [[f64; 4]; 3];
-
-pub(crate) const IDENTITY: Affine =
-    [[1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [0.0, 0.0, 1.0, 0.0]];
+use crate::mesh::Affine;
 
 /// The map of a matrix by columns; its last row says nothing.
 pub(crate) fn from_columns(columns: &[f64; 16]) -> Affine {
@@ -27,28 +23,6 @@ pub(crate) fn from_parts(translation: [f64; 3], rotation: [f64; 4], scale: [f64;
     })
 }
 
-/// First `inner`, then `outer`.
-pub(crate) fn compose(outer: &Affine, inner: &Affine) -> Affine {
-    if *outer == IDENTITY {
-        return *inner;
-    }
-    outer.map(|[a, b, c, shift]| {
-        let row = [0, 1, 2, 3].map(|k| a * inner[0][k] + b * inner[1][k] + c * inner[2][k]);
-        [row[0], row[1], row[2], row[3] + shift]
-    })
-}
-
-#[inline]
-pub(crate) fn apply(map: &Affine, [x, y, z]: [f64; 3]) -> [f64; 3] {
-    map.map(|[a, b, c, shift]| a * x + b * y + c * z + shift)
-}
-
-/// Whether the map turns left into right.
-pub(crate) fn mirrors(map: &Affine) -> bool {
-    let [[a, b, c, _], [d, e, f, _], [g, h, i, _]] = *map;
-    a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g) < 0.0
-}
-
 pub(crate) fn is_finite(map: &Affine) -> bool {
     map.as_flattened().iter().all(|x| x.is_finite())
 }
@@ -56,6 +30,7 @@ pub(crate) fn is_finite(map: &Affine) -> bool {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::mesh::{apply, compose, mirrors};
 
     #[test]
     fn parts_apply_from_the_right() {

@@ -1,4 +1,5 @@
-//! Writes GLB: positions as `f32`, and the triangles of each material as a primitive.
+//! Writes GLB: positions as `f32`, a mesh for each part, and in it the triangles of each material
+//! as a primitive.
 //!
 //! Vertices, what they have besides, and faces wait in scratch files. Once all are there, faces are
 //! brought into the order of their surfaces, and then the file is written from front to back, with
@@ -10,21 +11,26 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::io::error::IoError;
 use crate::io::gltf::container::{BINARY, CHUNK_HEADER_BYTES, HEADER_BYTES, JSON, MAGIC, VERSION};
-use crate::io::gltf::document::{Counts, Layout, write_document};
+use crate::io::gltf::document::{Counts, Group, Layout, PartShape, write_document};
 use crate::io::gltf::values::Values;
 use crate::io::output::{Aside, FACES, Output, VERTICES};
-use crate::io::palette::{Looks, Palette};
+use crate::io::palette::{LookMap, Palette};
+use crate::io::parts_written::{Extent, PartsWritten};
+use crate::io::scene::SceneTree;
 use crate::io::textures::Textures;
 use crate::io::{Format, WriteOptions};
 use crate::mesh::{
-    CornerForm, MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, Surface, VertexValues,
+    CornerForm, LengthUnit, MeshSink, SinkFile, SinkState, SinkStats, SinkTriangles, Surface,
+    VertexValues,
 };
-use crate::store::{Record, Scratch, Sorter};
+use crate::store::{Record, Scratch, Sorter, StoreError, Table};
 
 /// For the order of the faces.
 const SORT_BYTES: u64 = 4 << 20;
 /// For the numbers of faces of each material.
 const COUNT_BYTES: u64 = 64 << 10;
+/// For what is known of parts.
+const SHAPE_BYTES: u64 = 64 << 10;
 /// Three coordinates or three indices.
 const TRIPLE_BYTES: usize = 12;
 /// Vertices or faces that are handed on at a time.
@@ -39,10 +45,13 @@ pub(crate) struct GlbWriter {
     output: Output,
     scratch: Scratch,
     palette: Option<Palette>,
-    looks: Looks,
+    looks: LookMap,
     positions: Aside,
     values: Option<Values>,
     faces: Aside,
+    parts: PartsWritten,
+    scene: Option<SceneTree>,
+    metres: f64,
     vertices: u64,
     triangles: u64,
 }
@@ -51,6 +60,7 @@ pub(crate) struct GlbWriter {
 #[derive(Clone, Copy, Pod, Zeroable)]
 #[repr(C)]
 struct Face {
+    part: u32,
     /// The number of the material, twice, and 1 for a patch.
     surface: u32,
     /// Faces of a surface stay in order.
@@ -59,10 +69,10 @@ struct Face {
 }
 
 impl Record for Face {
-    type Key = (u32, u32);
+    type Key = (u32, u32, u32);
 
-    fn key(&self) -> (u32, u32) {
-        (self.surface, self.number)
+    fn key(&self) -> Self::Key {
+        (self.part, self.surface, self.number)
     }
 }
 
@@ -107,9 +117,17 @@ impl GlbWriter {
             positions,
             values,
             faces,
+            parts: PartsWritten::new(scratch),
+            scene: options.scene.clone(),
+            metres: options.unit.unwrap_or(LengthUnit::Meter).metres(),
             vertices: state.vertices,
             triangles: state.triangles,
         })
+    }
+
+    fn extent(&self) -> Extent {
+        let Self { vertices, triangles, .. } = *self;
+        Extent { vertices, triangles, bytes: self.faces.bytes() }
     }
 
     /// Refuses what no file can hold, before it is known how much else there will be.
@@ -125,45 +143,87 @@ impl GlbWriter {
         Err(IoError::TooLarge { path, what: "bytes", limit: MOST_BYTES })
     }
 
-    /// The box of the positions as they are written.
-    fn bounds(&mut self) -> Result<[[f32; 3]; 2], IoError> {
+    /// The boxes of the positions of all parts, as they are written.
+    fn shapes(&mut self) -> Result<Table<PartShape>, IoError> {
+        let mut shapes = Table::new(&self.scratch, SHAPE_BYTES);
+        let totals = self.extent();
         let [mut low, mut high] = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
-        let mut axis = 0;
+        let (mut axis, mut vertex) = (0, 0);
+        let mut end = self.parts.get(0, totals)?.vertices.end;
+        let parts = &mut self.parts;
+        let shape = |low, high| PartShape { first_group: 0, end_group: 0, low, high };
         self.positions.for_each_block(|block| {
             for bytes in block.as_chunks::<4>().0 {
+                while vertex == end {
+                    shapes.push(shape(low, high))?;
+                    end = parts.get(shapes.len(), totals)?.vertices.end;
+                    [low, high] = [[f32::INFINITY; 3], [f32::NEG_INFINITY; 3]];
+                }
                 let coordinate = f32::from_le_bytes(*bytes);
                 low[axis] = low[axis].min(coordinate);
                 high[axis] = high[axis].max(coordinate);
                 axis = (axis + 1) % 3;
+                vertex += u64::from(axis == 0);
             }
             Ok(())
         })?;
-        Ok([low, high])
+        while shapes.len() < parts.len() {
+            shapes.push(shape(low, high))?;
+        }
+        Ok(shapes)
     }
 
     /// Hands the faces to a sorter, and counts those of each surface.
-    fn sort_faces(&mut self) -> Result<(Sorter<Face>, Counts), IoError> {
+    fn sort_faces(
+        &mut self,
+        shapes: &mut Table<PartShape>,
+    ) -> Result<(Sorter<Face>, Table<Group>, Counts), IoError> {
         let mut sorter = Sorter::<Face>::new(&self.scratch, SORT_BYTES);
+        let mut groups = Table::new(&self.scratch, SHAPE_BYTES);
         let mut counts = Counts::new(&self.scratch, COUNT_BYTES);
-        let mut number = 0;
+        let mut own = Counts::new(&self.scratch, COUNT_BYTES);
+        let (mut number, mut part) = (0, 0);
+        let totals = self.extent();
+        let mut end = self.parts.get(0, totals)?.triangles.end;
+        let (scratch, parts) = (&self.scratch, &mut self.parts);
         self.faces.for_each_block(|block| {
             for face in block.as_chunks::<4>().0.as_chunks::<4>().0 {
+                while number == end {
+                    let whole = std::mem::replace(&mut own, Counts::new(scratch, COUNT_BYTES));
+                    close_part((part, whole), shapes, &mut groups, &mut counts)?;
+                    part += 1;
+                    end = parts.get(part, totals)?.triangles.end;
+                }
                 let [a, b, c, surface] = *face;
                 let surface = Surface::from_bits(u32::from_le_bytes(surface));
                 let (material, lane) = (surface.material(), usize::from(surface.is_patch()));
-                while counts.len() <= u64::from(material) {
-                    counts.push([0; 2])?;
-                }
-                let mut count = counts.get(material.into())?;
-                count[lane] += 1;
-                counts.set(material.into(), count)?;
+                add(&mut own, material, lane, 1)?;
                 let surface = 2 * material + lane as u32;
-                sorter.push(Face { surface, number, indices: [a, b, c] })?;
+                let (part, number_in_file) = (part as u32, number as u32);
+                let indices = [a, b, c];
+                sorter.push(Face { part, surface, number: number_in_file, indices })?;
                 number += 1;
             }
             Ok(())
         })?;
-        Ok((sorter, counts))
+        close_part((part, own), shapes, &mut groups, &mut counts)?;
+        Ok((sorter, groups, counts))
+    }
+
+    /// One group for each part that has triangles.
+    fn whole_parts(&mut self, shapes: &mut Table<PartShape>) -> Result<Table<Group>, IoError> {
+        let mut groups = Table::new(&self.scratch, SHAPE_BYTES);
+        let whole = self.extent();
+        for part in 0..self.parts.len() {
+            let triangles = self.parts.get(part, whole)?.triangles;
+            let (first_group, triangles) = (groups.len(), triangles.end - triangles.start);
+            if triangles > 0 {
+                groups.push(Group { triangles, material: 0, lane: 0 })?;
+            }
+            let shape = shapes.get(part)?;
+            shapes.set(part, PartShape { first_group, end_group: groups.len(), ..shape })?;
+        }
+        Ok(groups)
     }
 
     /// The images of materials that triangles have.
@@ -222,6 +282,10 @@ impl MeshSink for GlbWriter {
         }
     }
 
+    fn begin_part(&mut self, number: u32, name: &str) -> Result<(), IoError> {
+        Ok(self.parts.begin((number, name), self.extent())?)
+    }
+
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {
         if let Some(values) = &mut self.values {
             values.fill(self.vertices)?;
@@ -243,11 +307,13 @@ impl MeshSink for GlbWriter {
         let indices = triangles.indices;
         self.triangles += indices.len() as u64;
         self.check_size(0)?;
+        let first_vertex = self.parts.first_vertex()? as u32;
         let surfaces = self.looks.materials_of(triangles.surfaces)?;
         for (at, triangle) in indices.iter().enumerate() {
             let mut bytes = [0; TRIPLE_BYTES + 4];
             let surface = surfaces.get(at).copied().unwrap_or_default();
-            let numbers = triangle.iter().copied().chain([surface.bits()]);
+            let in_part = triangle.map(|index| index - first_vertex);
+            let numbers = in_part.into_iter().chain([surface.bits()]);
             for (number, bytes) in numbers.zip(bytes.as_chunks_mut::<4>().0) {
                 *bytes = number.to_le_bytes();
             }
@@ -278,22 +344,35 @@ impl MeshSink for GlbWriter {
     }
 
     fn finish(mut self: Box<Self>) -> Result<SinkStats, IoError> {
-        let bounds = self.bounds()?;
-        let sorted = match &self.palette {
-            Some(_) => Some(self.sort_faces()?),
-            None => None,
+        self.parts.begin_only()?;
+        let mut shapes = self.shapes()?;
+        let (sorter, groups, mut counts) = match &self.palette {
+            Some(_) => {
+                let (sorter, groups, counts) = self.sort_faces(&mut shapes)?;
+                (Some(sorter), groups, Some(counts))
+            }
+            None => (None, self.whole_parts(&mut shapes)?, None),
         };
-        let (sorter, mut counts) = sorted.unzip();
         let textures = self.textures(counts.as_mut())?;
         if let Some(values) = &mut self.values {
             values.fill(self.vertices)?;
         }
-        let Self { vertices, triangles, .. } = *self;
-        let values = self.values.as_ref().map(Values::layout).unwrap_or_default();
-        let mut layout =
-            Layout { vertices, triangles, bounds, counts, values, textures, image_bytes: 0 };
+        let mut layout = Layout {
+            vertices: self.vertices,
+            triangles: self.triangles,
+            parts: std::mem::replace(&mut self.parts, PartsWritten::new(&self.scratch)),
+            shapes,
+            groups,
+            counts,
+            values: self.values.as_ref().map(Values::layout).unwrap_or_default(),
+            textures,
+            image_bytes: 0,
+            scene: self.scene.take(),
+            metres: self.metres,
+            scratch: self.scratch.clone(),
+        };
         self.write_front(&mut layout)?;
-        let Self { mut output, positions, values, faces, .. } = *self;
+        let Self { mut output, positions, values, faces, vertices, triangles, .. } = *self;
         output.append(positions)?;
         if let Some(values) = values {
             output.append(values.into_aside())?;
@@ -311,6 +390,37 @@ impl MeshSink for GlbWriter {
         let file = output.finish()?;
         Ok(SinkStats { vertices, triangles, file })
     }
+}
+
+/// Counts triangles of a surface.
+fn add(counts: &mut Counts, material: u32, lane: usize, triangles: u64) -> Result<(), StoreError> {
+    while counts.len() <= u64::from(material) {
+        counts.push([0; 2])?;
+    }
+    let mut count = counts.get(material.into())?;
+    count[lane] += triangles;
+    counts.set(material.into(), count)
+}
+
+/// Enters the surfaces of a part, all of whose triangles were counted.
+fn close_part(
+    (part, mut own): (u64, Counts),
+    shapes: &mut Table<PartShape>,
+    groups: &mut Table<Group>,
+    counts: &mut Counts,
+) -> Result<(), StoreError> {
+    let first_group = groups.len();
+    for material in 0..own.len() {
+        for (lane, triangles) in own.get(material)?.into_iter().enumerate() {
+            if triangles > 0 {
+                let material = material as u32;
+                add(counts, material, lane, triangles)?;
+                groups.push(Group { triangles, material, lane: lane as u32 })?;
+            }
+        }
+    }
+    let shape = shapes.get(part)?;
+    shapes.set(part, PartShape { first_group, end_group: groups.len(), ..shape })
 }
 
 /// Writes the bytes of all images, each up to a multiple of four.

@@ -61,7 +61,7 @@ fn by_stream(path: &Path) -> Result<Content, IoError> {
     read_all(&mut ObjStreamReader::new(input, &scratch, &OPTIONS))
 }
 
-const OPTIONS: ReadOptions = ReadOptions { share_bytes: 1 << 20 };
+const OPTIONS: ReadOptions = ReadOptions::in_scene(1 << 20);
 
 const SQUARE: &str = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 0 4 0\n";
 

@@ -1,4 +1,5 @@
-//! Writes OBJ text, every number as the shortest text that gives its bits back.
+//! Writes OBJ text, every number as the shortest text that gives its bits back; parts are objects
+//! (`o`), whose names are told apart.
 //!
 //! Vertices, lists and faces are written as they come: indices count from the start of the file.
 //! The faces of one call are grouped by material, and every group names its own. Colours stand
@@ -10,8 +11,8 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number, push_single};
 use crate::io::output::Output;
-use crate::io::output_names::OutputNames;
-use crate::io::palette::Looks;
+use crate::io::output_names::{OutputNames, PartNames};
+use crate::io::palette::LookMap;
 use crate::io::polygon::WHITE;
 use crate::io::{Format, WriteOptions};
 use crate::mesh::{
@@ -25,7 +26,8 @@ pub(crate) struct ObjWriter {
     attributes: Attributes,
     /// Names of materials, where triangles have any.
     names: Option<OutputNames>,
-    looks: Looks,
+    part_names: PartNames,
+    looks: LookMap,
     order: Vec<(Surface, u32)>,
     /// Vertices of the last call, while their colours may come.
     pending: Vec<[f64; 3]>,
@@ -72,6 +74,7 @@ impl ObjWriter {
             output,
             attributes: options.attributes.and(Format::Obj.attributes()),
             names,
+            part_names: PartNames::new(scratch),
             looks,
             order: Vec::new(),
             pending: Vec::new(),
@@ -148,6 +151,12 @@ impl MeshSink for ObjWriter {
 
     fn corner_form(&self) -> CornerForm {
         if self.attributes.any() { CornerForm::OfCorners } else { CornerForm::None }
+    }
+
+    fn begin_part(&mut self, number: u32, name: &str) -> Result<(), IoError> {
+        self.write_pending(&[])?;
+        let name = self.part_names.name(number, name)?;
+        self.output.write(format!("o {name}\n").as_bytes())
     }
 
     fn vertices(&mut self, positions: &[[f64; 3]]) -> Result<(), IoError> {

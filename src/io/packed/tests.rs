@@ -50,7 +50,7 @@ struct Counted {
 
 fn read_counted(path: &Path) -> Result<Counted, IoError> {
     let scratch = Scratch::new(path.parent().expect("a file in a folder"));
-    let mut source = open(path, &scratch, &ReadOptions { share_bytes: 1 << 20 })?;
+    let mut source = open(path, &scratch, &ReadOptions::in_scene(1 << 20))?;
     let content = read_all(source.as_mut())?;
     Ok(Counted { content, bytes_read: source.bytes_read(), scratch_bytes: scratch.written_bytes() })
 }
@@ -188,7 +188,7 @@ fn bombs_are_refused_by_their_head_where_it_is_no_model() {
             std::fs::write(&path, zeros(packing, 16)).expect("a file");
             assert!(matches!(detect(&path), Err(IoError::Unreadable { .. })), "{name}");
             let scratch = Scratch::new(folder.path());
-            assert!(open(&path, &scratch, &ReadOptions { share_bytes: 1 << 20 }).is_err());
+            assert!(open(&path, &scratch, &ReadOptions::in_scene(1 << 20)).is_err());
             assert_eq!(scratch.written_bytes(), 0, "{name}");
         }
     }

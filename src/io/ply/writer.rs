@@ -11,7 +11,7 @@ use std::path::Path;
 
 use crate::io::error::IoError;
 use crate::io::output::{Aside, FACES, Output};
-use crate::io::palette::Looks;
+use crate::io::palette::LookMap;
 use crate::io::ply::paint::Paints;
 use crate::io::polygon::WHITE;
 use crate::io::{Format, WriteOptions};
@@ -41,7 +41,7 @@ pub(crate) struct PlyWriter {
     attributes: Attributes,
     /// What faces are painted with, where they have materials.
     paints: Option<Paints>,
-    looks: Looks,
+    looks: LookMap,
     /// Vertices of the last call, while their colours may come.
     pending: Vec<[f64; 3]>,
     vertices: u64,

@@ -63,7 +63,7 @@ fn push_base(text: &mut Vec<u8>, material: &Material, ending: &str) {
 }
 
 /// Appends a name as the value of an attribute; what XML cannot say is replaced.
-fn push_escaped(text: &mut Vec<u8>, name: &str) {
+pub(super) fn push_escaped(text: &mut Vec<u8>, name: &str) {
     for c in name.chars() {
         match c {
             '&' => text.extend_from_slice(b"&amp;"),

@@ -1,7 +1,7 @@
 //! The walk over everything that is built: every object in every place where it stands.
 //!
-//! In: the scene. Out: objects with a mesh, in the order of the items and of the components in
-//! them, each with its transform. Objects that only a printer needs are left out with all that is
+//! In: the scene. Out: objects, in the order of the items and of the components in them, each with
+//! its transforms. Objects that only a printer needs are left out with all that is
 //! in them. Memory: one frame a level, at most [`MOST_LEVELS`]. Fails: objects inside of
 //! themselves, too many levels or instances.
 
@@ -16,16 +16,31 @@ const MOST_LEVELS: usize = 128;
 /// The most objects in all their places, those that hold others as well.
 const MOST_INSTANCES: u64 = 1 << 20;
 
-/// An object in its place, with a mesh.
+/// An object in its place.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Instance {
     pub(super) object: Object,
+    /// Its row among the objects.
+    pub(super) row: u32,
+    /// Into the build.
     pub(super) transform: Transform,
+    /// Into the object that it is a part of.
+    pub(super) local: Transform,
+    /// The place of that one, in the order of the walk.
+    pub(super) parent: Option<u32>,
+}
+
+impl Instance {
+    pub(super) fn has_mesh(&self) -> bool {
+        self.object.vertices + self.object.triangles > 0
+    }
 }
 
 /// An object whose components are not done.
 struct Frame {
     resource: u32,
+    /// Its place in the order of the walk.
+    place: u32,
     transform: Transform,
     next: u64,
     end: u64,
@@ -37,6 +52,8 @@ pub(super) struct Walk {
     next_root: u64,
     frames: Vec<Frame>,
     visited: u64,
+    /// Of these, the ones that were shown.
+    entered: u32,
 }
 
 /// What a whole walk yields.
@@ -65,14 +82,14 @@ impl Totals {
 }
 
 impl Walk {
-    /// The next object that has a mesh.
+    /// The next object.
     pub(super) fn next(
         &mut self,
         scene: &mut Scene,
         path: &Path,
     ) -> Result<Option<Instance>, IoError> {
         loop {
-            let (resource, transform) = match self.frames.last_mut() {
+            let (resource, local, transform, parent) = match self.frames.last_mut() {
                 Some(frame) if frame.next == frame.end => {
                     self.frames.pop();
                     continue;
@@ -81,15 +98,17 @@ impl Walk {
                     let component = scene.components.get(frame.next)?;
                     frame.next += 1;
                     let transform = component.transform.then(&frame.transform);
-                    (component.resource as u32, transform)
+                    let parent = Some(frame.place);
+                    (component.resource as u32, component.transform, transform, parent)
                 }
                 None => match self.root(scene)? {
-                    Some(root) => root,
+                    Some((root, transform)) => (root, transform, transform, None),
                     None => return Ok(None),
                 },
             };
-            if let Some(instance) = self.enter(scene, path, resource, transform)? {
-                return Ok(Some(instance));
+            let object = self.enter(scene, path, resource, transform)?;
+            if let Some((row, object)) = object {
+                return Ok(Some(Instance { object, row, transform, local, parent }));
             }
         }
     }
@@ -116,14 +135,14 @@ impl Walk {
         Ok(None)
     }
 
-    /// Opens an object; what it is, if it has a mesh.
+    /// Opens an object; its row and what it is, unless it is there for the printer alone.
     fn enter(
         &mut self,
         scene: &mut Scene,
         path: &Path,
         number: u32,
         transform: Transform,
-    ) -> Result<Option<Instance>, IoError> {
+    ) -> Result<Option<(u32, Object)>, IoError> {
         let resource = scene.resource(number)?;
         if resource.kind() != Kind::Object {
             let at = scene.place(number)?;
@@ -141,15 +160,16 @@ impl Walk {
         if object.is_support != 0 {
             return Ok(None);
         }
+        let place = self.entered;
+        self.entered += 1;
         if object.components > 0 {
             if self.frames.len() == MOST_LEVELS {
                 return Err(IoError::too_many(path, "levels of components", MOST_LEVELS as u64));
             }
             let next = object.first_component;
             let end = next + object.components;
-            self.frames.push(Frame { resource: number, transform, next, end });
+            self.frames.push(Frame { resource: number, place, transform, next, end });
         }
-        let has_mesh = object.vertices + object.triangles > 0;
-        Ok(has_mesh.then_some(Instance { object, transform }))
+        Ok(Some((resource.row, object)))
     }
 }

@@ -2,6 +2,7 @@
 
 mod archive;
 mod bases;
+mod build;
 mod groups;
 #[cfg(test)]
 mod hostile_tests;

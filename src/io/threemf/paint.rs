@@ -3,8 +3,8 @@
 //! A triangle whose material shows an image, and that has texture coordinates, is painted with
 //! these (`texture2dgroup`); of others, one with a corner that is not opaque white with the
 //! colours of its vertices (`colorgroup`); all others with a base material. So names of materials
-//! that show images are not held. Ids: 1 are the base materials, 2 is the object, 3 the colours,
-//! and from 4 on two for each image. Memory: [`SORT_BYTES`] twice, and shares for tables.
+//! that show images are not held. Ids: 1 are the base materials, 2 is the object where there
+//! is one only, 3 the colours, and from 4 on two for each image. Memory: [`SORT_BYTES`] twice, and shares for tables.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -129,6 +129,11 @@ impl Paint {
 
     pub(super) fn has_textures(&self) -> bool {
         self.textures.count() > 0
+    }
+
+    /// The first id that no resource here has.
+    pub(super) fn next_id(&self) -> u32 {
+        image_id(self.textures.count() as u32)
     }
 
     pub(super) fn has_bases(&self) -> bool {

@@ -1,6 +1,6 @@
 //! Reads a 3MF package: all of its model first, then every object in every place where it stands.
 //!
-//! Each object in its place is a part. Vertices are numbered on from object to object. Numbers are
+//! Each object in its place is a part; by itself each object is one, and its places are nodes. Vertices are numbered on from object to object. Numbers are
 //! in the unit of the file. Without an item to build, all objects of the root are delivered.
 //! Colours are those of vertices where any triangle has several; else they are materials.
 //! Memory: that of [`Scene`], and an eighth of the share for the names of parts; while the model is
@@ -8,6 +8,8 @@
 
 use std::io::Read;
 use std::path::PathBuf;
+
+use bytemuck::{Pod, Zeroable};
 
 use crate::io::error::{IoError, Place, shown};
 use crate::io::input::Input;
@@ -17,11 +19,14 @@ use crate::io::threemf::instances::{Instance, Totals, Walk};
 use crate::io::threemf::model::ModelParser;
 use crate::io::threemf::part_name::part_key;
 use crate::io::threemf::properties::NOTHING;
-use crate::io::threemf::scene::{Face, Scene};
+use crate::io::threemf::scene::{Face, Object, Scene};
+use crate::io::threemf::transform::Transform;
 use crate::io::threemf::vocabulary::{MODEL_RELATIONSHIP, Space};
 use crate::io::threemf::xml::{Markup, read_xml};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
-use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, Part, TriangleBatch};
+use crate::mesh::{
+    Discarded, LengthUnit, Material, MeshSource, Part, Placement, SceneNode, TriangleBatch,
+};
 use crate::store::{Scratch, ScratchFile, Table};
 
 /// Where a package says what it is.
@@ -39,7 +44,10 @@ pub(crate) struct ThreeMfReader {
     /// The image that was asked for last, unpacked, and its size.
     unpacked: Option<(u32, ScratchFile, u64)>,
     scene: Scene,
+    placement: Placement,
     walk: Walk,
+    /// What was walked over, where parts are by themselves.
+    nodes: Table<Node>,
     totals: Totals,
     current: Option<Current>,
     /// Vertices and faces of the instances before the current one.
@@ -52,6 +60,18 @@ pub(crate) struct ThreeMfReader {
     discarded: Discarded,
     bytes_read: u64,
 }
+
+/// An object in its place: the map into its parent, the number of that, and its row.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Node {
+    local: Transform,
+    parent: u32,
+    row: u32,
+}
+
+/// No parent.
+const NONE: u32 = u32::MAX;
 
 /// The instance that is being delivered.
 struct Current {
@@ -79,7 +99,9 @@ impl ThreeMfReader {
             is_parsed: false,
             unpacked: None,
             scene,
+            placement: options.placement,
             walk: Walk::default(),
+            nodes: Table::new(scratch, options.share_bytes / 32),
             totals: Totals::default(),
             current: None,
             vertices: 0,
@@ -115,14 +137,19 @@ impl ThreeMfReader {
             self.vertices += instance.object.vertices;
             self.faces += instance.object.triangles;
         }
-        let next = self.walk.next(&mut self.scene, &self.path)?;
-        self.current = next.map(|instance| Current {
-            mirrors: instance.transform.mirrors(),
-            instance,
-            next: 0,
-            part: None,
-        });
-        Ok(self.current.is_some())
+        while let Some(mut instance) = self.walk.next(&mut self.scene, &self.path)? {
+            if self.placement == Placement::ByItself {
+                let parent = instance.parent.unwrap_or(NONE);
+                self.nodes.push(Node { local: instance.local, parent, row: instance.row })?;
+                instance.transform = Transform::IDENTITY;
+            }
+            if instance.has_mesh() && instance.object.part == 0 {
+                let mirrors = instance.transform.mirrors();
+                self.current = Some(Current { instance, mirrors, next: 0, part: None });
+                return Ok(true);
+            }
+        }
+        Ok(false)
     }
 
     /// Delivers the next face of the current instance.
@@ -151,6 +178,10 @@ impl ThreeMfReader {
                 let part = self.part_names.len() as u32;
                 self.part_names.push(object.name)?;
                 current.part = Some(part);
+                if self.placement == Placement::ByItself {
+                    let row = current.instance.row.into();
+                    self.scene.objects.set(row, Object { part: part + 1, ..object })?;
+                }
                 part
             }
         };
@@ -284,6 +315,22 @@ impl MeshSource for ThreeMfReader {
         Ok(Part { name: String::from_utf8_lossy(&name).into_owned() })
     }
 
+    fn node_count(&self) -> u64 {
+        self.nodes.len()
+    }
+
+    fn node(&mut self, number: u32) -> Result<Option<SceneNode>, IoError> {
+        let Node { local, parent, row } = self.nodes.get(number.into())?;
+        let object = self.scene.objects.get(row.into())?;
+        let name = self.scene.names.name(object.name)?;
+        Ok(Some(SceneNode {
+            name: String::from_utf8_lossy(&name).into_owned(),
+            parent: (parent != NONE).then_some(parent),
+            map: local.to_affine(),
+            part: object.part.checked_sub(1),
+        }))
+    }
+
     fn material(&mut self, number: u32) -> Result<Material, IoError> {
         self.scene.properties.describe(number)
     }
@@ -314,7 +361,10 @@ impl MeshSource for ThreeMfReader {
     }
 
     fn vertex_count(&self) -> Option<u64> {
-        Some(self.totals.vertices)
+        Some(match self.placement {
+            Placement::InScene => self.totals.vertices,
+            Placement::ByItself => self.vertices,
+        })
     }
 }
 

@@ -5,6 +5,8 @@
 //! fourth where its surface is known, and three more where it has texture coordinates, by their
 //! numbers. Memory: a record.
 
+use std::ops::Range;
+
 use crate::io::error::IoError;
 use crate::io::output::Aside;
 use crate::mesh::Surface;
@@ -92,11 +94,20 @@ impl Record {
 /// Shows everything that was laid aside.
 pub(super) fn for_each_record(
     aside: &mut Aside,
+    visit: impl FnMut(Record) -> Result<(), IoError>,
+) -> Result<(), IoError> {
+    for_each_record_in(aside, 0..aside.bytes(), visit)
+}
+
+/// Shows what was laid aside in these bytes, which hold whole records.
+pub(super) fn for_each_record_in(
+    aside: &mut Aside,
+    bytes: Range<u64>,
     mut visit: impl FnMut(Record) -> Result<(), IoError>,
 ) -> Result<(), IoError> {
     // The start of a record whose end is in the next block.
     let mut carried = Vec::new();
-    aside.for_each_block(|block| {
+    aside.for_each_block_in(bytes, |block| {
         let mut rest = block;
         while !carried.is_empty() && !rest.is_empty() {
             carried.push(rest[0]);

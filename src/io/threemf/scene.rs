@@ -73,6 +73,10 @@ pub(super) struct Object {
     pub(super) name: u32,
     /// Whether it is there for the printer alone.
     pub(super) is_support: u32,
+    /// One more than the number of the part that it is, where parts are read by themselves, once
+    /// it was read.
+    pub(super) part: u32,
+    pub(super) padding: u32,
 }
 
 /// A triangle of an object, with numbers of vertices in it.

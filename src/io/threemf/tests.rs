@@ -236,7 +236,7 @@ fn the_unit_is_kept() {
         std::fs::write(&path, &bytes).expect("a file");
         let input = Input::open(&path, 0).expect("opens");
         let scratch = Scratch::new(folder.path());
-        let options = ReadOptions { share_bytes: 0 };
+        let options = ReadOptions::in_scene(0);
         let mut reader = ThreeMfReader::open(input, &scratch, &options).expect("opens");
         let mut batch = TriangleBatch::default();
         assert!(reader.next_batch(&mut batch).expect("readable"));
@@ -316,7 +316,7 @@ fn what_the_share_spills_is_read_alike() {
     std::fs::write(&path, bytes).expect("a file");
     let scratch = Scratch::new(folder.path());
     let [small, large] = [0, 1 << 30].map(|share_bytes| {
-        let options = ReadOptions { share_bytes };
+        let options = ReadOptions::in_scene(share_bytes);
         let mut source = crate::io::open(&path, &scratch, &options).expect("opens");
         crate::io::tests::read_all(source.as_mut()).expect("readable")
     });

@@ -4,7 +4,8 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::io::numbers::parse_number;
+use crate::io::numbers::{parse_number, push_number};
+use crate::mesh::Affine;
 
 /// Where an object stands in another one, or in the build.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
@@ -25,6 +26,26 @@ impl Transform {
             *number = parse_number(words.next()?.as_bytes())?;
         }
         words.next().is_none().then_some(transform)
+    }
+
+    /// The same as columns from the right.
+    pub(super) fn to_affine(self) -> Affine {
+        [0, 1, 2].map(|axis| [0, 1, 2, 3].map(|row| self.rows[row][axis]))
+    }
+
+    /// The map that `to_affine` gives.
+    pub(super) fn from_affine(map: &Affine) -> Self {
+        Self { rows: [0, 1, 2, 3].map(|row| [0, 1, 2].map(|axis| map[axis][row])) }
+    }
+
+    /// Appends what [`Transform::parse`] reads.
+    pub(super) fn push(&self, text: &mut Vec<u8>) {
+        for (at, &number) in self.rows.as_flattened().iter().enumerate() {
+            if at > 0 {
+                text.push(b' ');
+            }
+            push_number(text, number);
+        }
     }
 
     /// This one first, then `outer`.

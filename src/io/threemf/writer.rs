@@ -1,4 +1,5 @@
-//! Writes 3MF: one object, one item, and what its triangles are painted with ([`Paint`]).
+//! Writes 3MF: an object for each part, the objects and items that place them ([`Build`]), and what
+//! triangles are painted with ([`Paint`]).
 //!
 //! In the model all vertices stand before all triangles, and all of it is packed: vertices and
 //! triangles wait aside as records until the end, when the archive is written in one go. Every
@@ -10,11 +11,15 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::numbers::{push_count, push_number};
 use crate::io::output::{Aside, FACES, Output};
-use crate::io::palette::{Looks, Palette};
+use crate::io::palette::{LookMap, Palette};
+use crate::io::parts_written::{Extent, PartsWritten, WrittenPart};
 use crate::io::polygon::WHITE;
+use crate::io::scene::SceneTree;
+use crate::io::threemf::bases::push_escaped;
+use crate::io::threemf::build::Build;
 use crate::io::threemf::package::{HEAD, content_types, relationships};
 use crate::io::threemf::paint::{MOST_INDICES, Paint};
-use crate::io::threemf::records::{Record, for_each_record};
+use crate::io::threemf::records::{Record, for_each_record_in};
 use crate::io::threemf::vocabulary::{CORE, MATERIALS, MODEL_RELATIONSHIP};
 use crate::io::threemf::zip_file::ZipFile;
 use crate::io::{Format, WriteOptions};
@@ -24,6 +29,8 @@ use crate::mesh::{
 };
 use crate::store::Scratch;
 
+/// Id of the object of a file with one part.
+const ONLY_OBJECT: u32 = 2;
 /// No record of a mesh takes more bytes in the model.
 const LONGEST_LINE_BYTES: u64 = 160;
 /// What may stand in a model besides the mesh before its sizes would have to be large ones.
@@ -35,11 +42,13 @@ pub(crate) struct ThreeMfWriter {
     records: Aside,
     scratch: Scratch,
     palette: Option<Palette>,
-    looks: Looks,
+    looks: LookMap,
     attributes: Attributes,
     /// Vertices whose colours are laid aside.
     coloured: u64,
     unit: LengthUnit,
+    parts: PartsWritten,
+    scene: Option<SceneTree>,
     record: Vec<u8>,
     vertices: u64,
     triangles: u64,
@@ -82,6 +91,8 @@ impl ThreeMfWriter {
             attributes: options.attributes.and(Format::ThreeMf.attributes()),
             coloured: state.vertices,
             unit: options.unit.unwrap_or_default(),
+            parts: PartsWritten::new(scratch),
+            scene: options.scene.clone(),
             record: Vec::new(),
             vertices: state.vertices,
             triangles: state.triangles,
@@ -95,6 +106,11 @@ impl ThreeMfWriter {
             self.coloured += 1;
         }
         Ok(())
+    }
+
+    fn extent(&self) -> Extent {
+        let Self { vertices, triangles, .. } = *self;
+        Extent { vertices, triangles, bytes: self.records.bytes() }
     }
 
     fn push(&mut self, record: Record) -> Result<(), IoError> {
@@ -124,6 +140,11 @@ impl MeshSink for ThreeMfWriter {
             }
         }
         self.fill_colours()
+    }
+
+    fn begin_part(&mut self, number: u32, name: &str) -> Result<(), IoError> {
+        self.fill_colours()?;
+        Ok(self.parts.begin((number, name), self.extent())?)
     }
 
     fn list_uvs(&mut self, uvs: &[[f32; 2]]) -> Result<(), IoError> {
@@ -169,7 +190,9 @@ impl MeshSink for ThreeMfWriter {
 
     fn finish(mut self: Box<Self>) -> Result<SinkStats, IoError> {
         self.fill_colours()?;
-        let Self { output, mut records, palette, unit, vertices, triangles, .. } = *self;
+        self.parts.begin_only()?;
+        let whole = self.extent();
+        let Self { output, mut records, palette, unit, mut parts, vertices, triangles, .. } = *self;
         let mut paint = Paint::new(&self.scratch, palette.as_ref(), self.attributes, &mut records)?;
         let mut zip = ZipFile::new(output);
         for (name, content) in [
@@ -191,8 +214,16 @@ impl MeshSink for ThreeMfWriter {
         zip.write(model.as_bytes())?;
         zip.write(b"<resources>\n")?;
         paint.write(&mut zip, &mut records)?;
-        write_object(&mut zip, &mut records, &mut paint)?;
-        zip.write(b"</resources>\n<build>\n<item objectid=\"2\"/>\n</build>\n</model>\n")?;
+        let first_id = if parts.len() == 1 { ONLY_OBJECT } else { paint.next_id() };
+        for part in 0..parts.len() {
+            let written = parts.get(part, whole)?;
+            let id = first_id + part as u32;
+            write_object(&mut zip, (id, &written), &mut records, &mut paint)?;
+        }
+        let next_id = paint.next_id() + parts.len() as u32;
+        let build = Build::new(&self.scratch, self.scene.as_ref(), &mut parts, first_id)?;
+        build.write(&mut zip, next_id)?;
+        zip.write(b"</model>\n")?;
         zip.end()?;
         paint.write_images(&mut zip)?;
         let file = zip.finish()?.finish()?;
@@ -204,12 +235,20 @@ fn too_large(output: &Output, what: &'static str) -> IoError {
     IoError::TooLarge { path: output.path().to_path_buf(), what, limit: MOST_INDICES }
 }
 
-fn write_object(zip: &mut ZipFile, records: &mut Aside, paint: &mut Paint) -> Result<(), IoError> {
+fn write_object(
+    zip: &mut ZipFile,
+    (id, part): (u32, &WrittenPart),
+    records: &mut Aside,
+    paint: &mut Paint,
+) -> Result<(), IoError> {
     let property = if paint.has_bases() { " pid=\"1\" pindex=\"0\"" } else { "" };
-    zip.write(format!("<object id=\"2\" type=\"model\"{property}>\n<mesh>\n").as_bytes())?;
-    let mut text = Vec::new();
+    let mut text = format!("<object id=\"{id}\" type=\"model\"{property}").into_bytes();
+    push_name(&mut text, &part.name);
+    text.extend_from_slice(b">\n<mesh>\n");
+    zip.write(&text)?;
+    let (bytes, first_vertex) = (part.bytes.clone(), part.vertices.start as u32);
     zip.write(b"<vertices>\n")?;
-    for_each_record(records, |record| {
+    for_each_record_in(records, bytes.clone(), |record| {
         let Record::Vertex(position) = record else { return Ok(()) };
         text.clear();
         text.extend_from_slice(b"<vertex");
@@ -222,7 +261,7 @@ fn write_object(zip: &mut ZipFile, records: &mut Aside, paint: &mut Paint) -> Re
         zip.write(&text)
     })?;
     zip.write(b"</vertices>\n<triangles>\n")?;
-    for_each_record(records, |record| {
+    for_each_record_in(records, bytes, |record| {
         let (indices, surface, has_uvs) = match record {
             Record::Triangle(indices, surface) => (indices, surface, false),
             Record::Textured(indices, surface, _) => (indices, Some(surface), true),
@@ -230,12 +269,21 @@ fn write_object(zip: &mut ZipFile, records: &mut Aside, paint: &mut Paint) -> Re
         };
         text.clear();
         text.extend_from_slice(b"<triangle");
-        push_numbers(&mut text, [" v1", " v2", " v3"], indices);
+        push_numbers(&mut text, [" v1", " v2", " v3"], indices.map(|index| index - first_vertex));
         push_property(&mut text, paint, (indices, surface, has_uvs))?;
         text.extend_from_slice(b"/>\n");
         zip.write(&text)
     })?;
     zip.write(b"</triangles>\n</mesh>\n</object>\n")
+}
+
+/// Appends the name of an object, if it has one.
+pub(super) fn push_name(text: &mut Vec<u8>, name: &str) {
+    if !name.is_empty() {
+        text.extend_from_slice(b" name=\"");
+        push_escaped(text, name);
+        text.push(b'"');
+    }
 }
 
 /// Appends what a triangle is painted with.

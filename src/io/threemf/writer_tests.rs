@@ -26,7 +26,7 @@ fn options(scratch: &Scratch, materials: &[Material]) -> WriteOptions {
 }
 
 fn read(path: &Path, scratch: &Scratch) -> Content {
-    let options = ReadOptions { share_bytes: 1 << 20 };
+    let options = ReadOptions::in_scene(1 << 20);
     read_all(open(path, scratch, &options).expect("opens").as_mut()).expect("readable")
 }
 

@@ -10,6 +10,7 @@ use crate::ingest::SoupSums;
 use crate::io::Format;
 use crate::mesh::Attributes;
 use crate::repair::estimate::counts::Counts;
+use crate::repair::measuring::SAMPLES;
 use crate::repair::plan::MemoryPlan;
 
 /// Records of spools.
@@ -87,6 +88,12 @@ const UNNUMBERED_TAPE_BYTES: f64 = 200.0;
 /// A triangle in the cells where pairs meet: 24 bytes, more where parcels are small, a fifth of them
 /// in several cells.
 pub const CELL_TRIANGLE_BYTES: f64 = 60.0;
+/// A triangle that is compared: on tape, with its place along a curve, and the boxes around it.
+const MEASURED_BYTES: f64 = 80.0;
+const MEASURED_SORT_BYTES: f64 = 96.0;
+const BOX_BYTES: f64 = 48.0 / 7.0;
+/// Samples and corners of a surface, sorted and in order, and their distances.
+const MEASURED_SAMPLES_BYTES: f64 = 2.0 * SAMPLES as f64 * (2.0 * 112.0 + 16.0);
 /// A vertex under way takes so much of the proof's memory, growth included.
 pub const FAN_BYTES: f64 = 250.0;
 /// The look of a triangle, and the sort that finds it: three sides, with room for their order.
@@ -144,6 +151,8 @@ pub struct DiskSteps {
     pub write: u64,
     /// The written file is proved.
     pub prove: u64,
+    /// It is compared with the soup.
+    pub measure: u64,
 }
 
 impl DiskSteps {
@@ -151,10 +160,10 @@ impl DiskSteps {
     #[must_use]
     pub fn peak(&self) -> u64 {
         let Self { read, bin, settle, mend, scan, patch, flood, revise, .. } = *self;
-        let Self { relabel, choose, place, separate, draw, write, prove, .. } = *self;
+        let Self { relabel, choose, place, separate, draw, write, prove, measure, .. } = *self;
         let before = [read, bin, settle, mend, scan, patch, flood, revise];
-        let all = before.into_iter().chain([relabel, choose, place, separate, draw, write, prove]);
-        all.max().unwrap_or(0)
+        let after = [relabel, choose, place, separate, draw, write, prove, measure];
+        before.into_iter().chain(after).max().unwrap_or(0)
     }
 }
 
@@ -232,14 +241,16 @@ impl DiskModel<'_> {
                 + flips
                 + regions
                 + self.revising(pairs)) as u64,
-            relabel: (kept + hits + flips + regions + signs) as u64,
-            choose: (kept + hits + flips + signs + cells + 2.0 * surface) as u64,
-            place: (kept + hits + flips + signs + cells) as u64,
+            relabel: (kept + soup + hits + flips + regions + signs) as u64,
+            choose: (kept + soup + hits + flips + signs + cells + 2.0 * surface) as u64,
+            place: (kept + soup + hits + flips + signs + cells) as u64,
             // Two looks, or the last one and the surface.
-            separate: (kept + signs + cells + 2.0 * surface) as u64,
-            draw: (kept + signs + cells + surface + drawn + drawing) as u64,
-            write: (kept + signs + cells + surface + drawn + painting + output + aside) as u64,
-            prove: (kept + cells + surface + drawn + output + self.proof()) as u64,
+            separate: (kept + soup + signs + cells + 2.0 * surface) as u64,
+            draw: (kept + soup + signs + cells + surface + drawn + drawing) as u64,
+            write: (kept + soup + signs + cells + surface + drawn + painting + output + aside)
+                as u64,
+            prove: (kept + soup + cells + surface + drawn + output + self.proof()) as u64,
+            measure: (kept + soup + output + self.measuring(triangles)) as u64,
         }
     }
 
@@ -406,6 +417,25 @@ impl DiskModel<'_> {
             + spilled(SAMPLE_BYTES * samples, 0.0, share / 4.0)
             + spilled(WALL_BYTES * triangles, 0.0, share / 8.0)
             + spilled(added, ORDER_BYTES / BIN_SORT_BYTES, share / 4.0)
+    }
+
+    /// What the comparison and the reader of the written file spill: the soup on tape, in order and in
+    /// its tree, the output on tape, which is its tree.
+    fn measuring(&self, triangles: f64) -> f64 {
+        let share = self.plan.share_bytes as f64 / 4.0 * 3.0;
+        let most = &self.counts.at_most;
+        let read = |count: f64| {
+            spilled(MEASURED_BYTES * count, 0.0, share / 8.0)
+                + spilled(BOX_BYTES * count, 0.0, share / 64.0)
+        };
+        let order = ORDER_BYTES / MEASURED_SORT_BYTES;
+        let sorted = spilled(MEASURED_SORT_BYTES * triangles, order, share / 8.0);
+        let positions = match self.format.has_indices() {
+            true => spilled(POSITION_BYTES * most.vertices as f64, 0.0, share / 8.0),
+            false => 0.0,
+        };
+        let samples = 2.0 * spilled(MEASURED_SAMPLES_BYTES, 0.0, share / 16.0);
+        2.0 * read(triangles) + sorted + read(most.triangles as f64) + positions + samples
     }
 
     /// What the proof and the reader of the written file spill.

@@ -8,6 +8,7 @@ use crate::io::Format;
 use crate::mesh::Attributes;
 use crate::repair::estimate::counts::Counts;
 use crate::repair::estimate::disk::{CELL_TRIANGLE_BYTES, FAN_BYTES, FileSizes, SMALL_BIN};
+use crate::repair::measuring::SAMPLES;
 use crate::repair::plan::{MemoryPlan, WINDOW_BYTES};
 
 /// The program, and what a worker holds while bricks pass.
@@ -36,6 +37,11 @@ const POSITION_BYTES: f64 = 24.0;
 /// A triangle while the pairs of its cell are tested; so many at one time in each thread.
 const JOINED_BYTES: f64 = 300.0;
 const MOST_JOINED: f64 = 16_384.0;
+/// A triangle that is compared, and one that is put in order for it; samples of both surfaces with
+/// their distances.
+const MEASURED_BYTES: f64 = 90.0;
+const MEASURED_SORT_BYTES: f64 = 220.0;
+const SAMPLES_BYTES: f64 = 4.0 * SAMPLES as f64 * 300.0;
 /// What an allocator keeps of the lists of early steps; larger ones go back at once.
 const RETAINED_BYTES: f64 = (32_u32 << 20) as f64;
 /// Room that lists keep for growing.
@@ -89,6 +95,7 @@ impl MemoryModel<'_> {
             0.0
         };
         let late = patch.max(flood).max(contour + painting).max(self.proof(files));
+        let late = late.max(self.measuring());
         let bytes =
             BASE_BYTES + THREAD_BYTES * threads + early.max(early.min(RETAINED_BYTES) + late);
         (bytes as u64).min(budget_bytes)
@@ -101,6 +108,18 @@ impl MemoryModel<'_> {
             return WHOLE_FILE_FACTOR * input;
         }
         (GROWTH * INPUT_VERTEX_BYTES * self.input_vertices as f64).min(share)
+    }
+
+    /// What the comparison holds: both surfaces, one of them in order.
+    fn measuring(&self) -> f64 {
+        let share = self.plan.share_bytes as f64 / 4.0 * 3.0;
+        let written = GROWTH * MEASURED_BYTES * self.counts.at_most.triangles as f64;
+        let read = GROWTH * MEASURED_SORT_BYTES * self.sums.finite_triangles() as f64;
+        let positions = POSITION_BYTES * self.counts.at_most.vertices as f64;
+        written.min(share / 7.0)
+            + read.min(share / 3.0)
+            + positions.min(share / 6.0)
+            + SAMPLES_BYTES
     }
 
     fn proof(&self, files: &FileSizes) -> f64 {

@@ -18,7 +18,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
-use crate::ingest::{SoupSums, sum_up};
+use crate::ingest::{Converted, SoupSums, sum_up};
 use crate::io::{Format, ReadOptions};
 use crate::monitor::{Monitor, Stage};
 use crate::octree::Domain;
@@ -30,6 +30,7 @@ use crate::repair::length::Ruler;
 use crate::repair::outcome::as_text;
 use crate::repair::plan::{MemoryPlan, floor_bytes};
 use crate::repair::settings::{Limits, Settings};
+use crate::repair::stages::check_converted;
 use crate::store::Scratch;
 
 pub use counts::{Bounds, Counts};
@@ -113,10 +114,12 @@ pub fn estimate(
     let total = std::fs::metadata(input).map_or(0, |m| m.len());
     monitor.begin(Stage::Ingest, total);
     let scratch = Scratch::new(limits.work_dir.as_deref().unwrap_or(Path::new(".")));
-    let options = ReadOptions { share_bytes: plan.share_bytes };
+    let options = ReadOptions::in_scene(plan.share_bytes);
     let mut source = crate::io::open(input, &scratch, &options).map_err(RepairError::Input)?;
-    let sums = sum_up(&mut *source, settings.strict, monitor)
+    let mut converted = Converted::new(&mut *source, settings.unit, settings.to_unit);
+    let sums = sum_up(&mut converted, settings.strict, monitor)
         .map_err(|error| RepairError::from_ingest(error, input))?;
+    check_converted(input, settings.to_unit, sums.unit)?;
     let input_vertices = source.vertex_count().unwrap_or(0);
     drop(source);
     monitor.end(Stage::Ingest);
@@ -125,7 +128,7 @@ pub fn estimate(
     }
     let thickness = settings.sheet_thickness;
     let ruler = Ruler { bounds: sums.bounds, unit: sums.unit.or(settings.unit) };
-    let grid = choose_domain(input, &ruler, settings.depth, thickness, format)?;
+    let grid = choose_domain(input, &ruler, settings.depth, thickness, format, 0.0)?;
     let sheet_cells = settings.sheet_thickness.in_cells(&ruler, &grid);
     let no_unit = || RepairError::NoUnit { path: input.to_path_buf() };
     let counts = Counts::predict(&sums, &grid, sheet_cells.ok_or_else(no_unit)?);

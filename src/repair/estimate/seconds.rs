@@ -22,8 +22,9 @@ const PER_CROSSING_SIGNED: f64 = 80.0;
 const PER_BRICK: f64 = 60_000.0;
 const PER_CROSSING_PLACED: f64 = 1400.0;
 const PER_TRIANGLE_PROVED: f64 = 600.0;
+const PER_TRIANGLE_MEASURED: f64 = 350.0;
 /// Share of a stage that more threads make shorter.
-const PARALLEL: [(Stage, f64); 7] = [
+const PARALLEL: [(Stage, f64); 8] = [
     (Stage::Ingest, 0.5),
     (Stage::Bridge, 0.3),
     (Stage::Scan, 0.9),
@@ -31,6 +32,7 @@ const PARALLEL: [(Stage, f64); 7] = [
     (Stage::Sign, 0.8),
     (Stage::Contour, 0.9),
     (Stage::Verify, 0.5),
+    (Stage::Deviate, 0.3),
 ];
 
 /// Seconds of each stage with so many threads.
@@ -53,6 +55,7 @@ pub fn stages(sums: &SoupSums, counts: &Counts, threads: usize) -> BTreeMap<Stag
         Stage::Sign => PER_CROSSING_SIGNED * crossings + PER_BRICK * bricks,
         Stage::Contour => PER_CROSSING_PLACED * crossings,
         Stage::Verify => PER_TRIANGLE_PROVED * 2.0 * crossings,
+        Stage::Deviate => PER_TRIANGLE_MEASURED * (2.0 * crossings + sums.stats.triangles as f64),
     };
     let with_threads = |(stage, share)| {
         let alone: f64 = 1.0 - share;

@@ -122,7 +122,7 @@ fn look(
 ) -> Result<Shown, ReportError> {
     let share_bytes = options.share_bytes;
     let open = |path: &Path| {
-        let source = crate::io::open(path, scratch, &ReadOptions { share_bytes })?;
+        let source = crate::io::open(path, scratch, &ReadOptions::in_scene(share_bytes))?;
         Ok(source as Box<dyn MeshSource<Error = IoError>>)
     };
     let cube = match model.outcome.and_then(|outcome| outcome.output.proof.bounds) {

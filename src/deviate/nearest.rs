@@ -1,0 +1,178 @@
+//! Walks a tree: the triangle nearest to a point, and whether a ray meets any.
+
+use glam::DVec3;
+
+use crate::deviate::pages::Pages;
+use crate::deviate::reading::Triangle;
+use crate::deviate::tree::{Bounds, GROUP, Tree};
+use crate::geom::closest_on_triangle;
+use crate::store::StoreError;
+
+/// What is nearest to a point.
+#[derive(Clone, Copy)]
+pub(crate) struct Near {
+    pub(crate) distance_squared: f64,
+    pub(crate) point: DVec3,
+    /// Of the angle between the normals, the cosine without its sign; negative where either has
+    /// none.
+    pub(crate) cosine: f64,
+    triangle: Triangle,
+}
+
+impl Near {
+    /// Whether this goes before another: nearer, then more alike, then first in the file.
+    fn goes_before(&self, other: &Self) -> bool {
+        let order = self.distance_squared.total_cmp(&other.distance_squared);
+        let order = order.then(other.cosine.total_cmp(&self.cosine));
+        order.then(self.triangle.number.cmp(&other.triangle.number)).is_lt()
+    }
+}
+
+/// The cosine of the angle between two normals, without its sign; -1 where either has none.
+fn cosine_between(one: DVec3, other: DVec3) -> f64 {
+    let lengths = one.length() * other.length();
+    if lengths > 0.0 && lengths.is_finite() {
+        (one.dot(other).abs() / lengths).min(1.0)
+    } else {
+        -1.0
+    }
+}
+
+/// What `point` with `normal` has nearest on one triangle; `None` if that is farther than `bound`,
+/// squared.
+#[inline]
+pub(crate) fn near_on(
+    point: DVec3,
+    normal: DVec3,
+    triangle: &Triangle,
+    bound: f64,
+) -> Option<Near> {
+    let closest = closest_on_triangle(point, triangle.points());
+    let distance_squared = point.distance_squared(closest);
+    (distance_squared <= bound).then(|| {
+        let cosine = cosine_between(normal, triangle.normal());
+        Near { distance_squared, point: closest, cosine, triangle: *triangle }
+    })
+}
+
+/// A walker of one tree; each worker has its own.
+pub(crate) struct Walker<'t> {
+    triangles: Pages<'t, Triangle>,
+    levels: Vec<Pages<'t, Bounds>>,
+    /// Nodes to look at: the bound of their distance, level and number.
+    stack: Vec<(f64, usize, u64)>,
+    /// What the last point had nearest: a good guess for the next.
+    last: Option<Triangle>,
+}
+
+impl<'t> Walker<'t> {
+    /// A walker whose pages take about `share_bytes`.
+    pub(crate) fn new(tree: &'t Tree, share_bytes: u64) -> Self {
+        let levels = tree.levels.iter().map(|level| Pages::new(level, share_bytes / 8));
+        Self {
+            triangles: Pages::new(&tree.triangles, share_bytes / 2),
+            levels: levels.collect(),
+            stack: Vec::new(),
+            last: None,
+        }
+    }
+
+    /// What is nearest to `point`; of several, what is most like `normal`; `None` in an empty tree.
+    pub(crate) fn nearest(
+        &mut self,
+        point: DVec3,
+        normal: DVec3,
+    ) -> Result<Option<Near>, StoreError> {
+        let guess = |triangle| near_on(point, normal, &triangle, f64::INFINITY);
+        let mut best = self.last.and_then(guess);
+        let farthest = |best: &Option<Near>| best.map_or(f64::INFINITY, |b| b.distance_squared);
+        self.start();
+        while let Some((bound, level, node)) = self.stack.pop() {
+            if bound > farthest(&best) {
+                continue;
+            }
+            if level == 0 {
+                for triangle in self.triangles.group(node * GROUP)? {
+                    let near = near_on(point, normal, triangle, farthest(&best));
+                    best = match (best, near) {
+                        (Some(best), Some(near)) if !near.goes_before(&best) => Some(best),
+                        (best, near) => near.or(best),
+                    };
+                }
+                continue;
+            }
+            let from = self.stack.len();
+            for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
+            {
+                let bound = bounds.distance_squared(point);
+                if bound <= farthest(&best) {
+                    self.stack.push((bound, level - 1, child));
+                }
+            }
+            // The nearest is the next.
+            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        self.last = best.map(|best| best.triangle);
+        Ok(best)
+    }
+
+    /// A triangle that the ray meets and light does not pass, whichever is found first.
+    pub(crate) fn blocker(
+        &mut self,
+        origin: DVec3,
+        direction: DVec3,
+    ) -> Result<Option<Triangle>, StoreError> {
+        let inverse = direction.recip();
+        self.start();
+        while let Some((_, level, node)) = self.stack.pop() {
+            if level == 0 {
+                for triangle in self.triangles.group(node * GROUP)? {
+                    if triangle.is_pane == 0 && is_met(origin, direction, triangle) {
+                        return Ok(Some(*triangle));
+                    }
+                }
+                continue;
+            }
+            let from = self.stack.len();
+            for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
+            {
+                if let Some(enter) = bounds.entered(origin, inverse) {
+                    self.stack.push((enter, level - 1, child));
+                }
+            }
+            // What stops the ray is near more often than not.
+            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        Ok(None)
+    }
+
+    fn start(&mut self) {
+        self.stack.clear();
+        // Of an empty tree there is no box.
+        if let Some(top) = self.levels.len().checked_sub(1) {
+            self.stack.push((0.0, top, 0));
+        }
+    }
+}
+
+/// Whether a ray meets a triangle, in floating point.
+///
+/// Source: Moeller and Trumbore 1997, Fast, minimum storage ray-triangle intersection.
+#[inline]
+pub(crate) fn is_met(origin: DVec3, direction: DVec3, triangle: &Triangle) -> bool {
+    let [a, b, c] = triangle.points();
+    let (ab, ac) = (b - a, c - a);
+    let across = direction.cross(ac);
+    let determinant = ab.dot(across);
+    // All parts are compared with the determinant, whatever its sign.
+    let sign = determinant.signum();
+    let most = determinant.abs();
+    let from = origin - a;
+    let u = from.dot(across) * sign;
+    if most == 0.0 || u < 0.0 || u > most {
+        return false;
+    }
+    let up = from.cross(ab);
+    let v = direction.dot(up) * sign;
+    v >= 0.0 && u + v <= most && ac.dot(up) * sign > 0.0
+}
