@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use crate::catalogue::CatalogueError;
 use crate::catalogue::child::{Asked, Exited};
-use crate::catalogue::job::{Job, Made, RawPath, Task};
+use crate::catalogue::job::{Drawing, Job, Made, RawPath, Task};
 use crate::catalogue::journal::ModelRow;
-use crate::catalogue::options::{BatchOptions, Wanted};
+use crate::catalogue::options::{BatchOptions, Pages, Wanted};
 use crate::catalogue::state::{Cause, Rung};
 use crate::repair::{Depth, Settings, floor_bytes};
 use crate::store::{Digester, StoreError};
@@ -39,6 +39,8 @@ pub struct Place {
     source: PathBuf,
     target: PathBuf,
     work: PathBuf,
+    report: PathBuf,
+    pages: Pages,
     max_disk_bytes: Option<u64>,
     shared: Grant,
     alone: Grant,
@@ -65,6 +67,8 @@ impl Place {
             source: options.source.clone(),
             target: options.target.clone(),
             work: work_folder(options, own)?,
+            report: options.report.clone(),
+            pages: options.pages,
             max_disk_bytes: options.max_disk_bytes,
             shared: Grant { memory_bytes: share, threads: (threads / jobs).max(1) },
             alone: Grant { memory_bytes: whole, threads },
@@ -138,6 +142,12 @@ impl Place {
             threads: grant.threads,
             max_disk_bytes: self.max_disk_bytes,
             work_dir: RawPath::new(folder),
+            drawing: Drawing {
+                wanted: self.pages,
+                report: RawPath::new(&self.report),
+                number: row.id,
+                name: row.relative.to_string_lossy().into_owned(),
+            },
         }
     }
 

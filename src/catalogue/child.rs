@@ -64,6 +64,8 @@ pub struct Watch<'w> {
     pub stops: &'w (dyn Fn() -> bool + Sync),
     /// Hears where it is.
     pub working: &'w (dyn Fn(Stage, f64) + Sync),
+    /// Hears remarks.
+    pub note: &'w (dyn Fn(&str) + Sync),
 }
 
 /// A worker process that waits for jobs. Dropped, it is killed.
@@ -135,6 +137,7 @@ impl Worker {
         loop {
             match self.reports.recv_timeout(LOOK_INTERVAL) {
                 Ok(Report::Working { stage, share }) => (watch.working)(stage, share),
+                Ok(Report::Note { text }) => (watch.note)(&text),
                 Ok(Report::Ended(end)) => {
                     ending = Some(*end);
                     if of_one_job {

@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::catalogue::options::Pages;
 use crate::catalogue::stamp::Stamped;
 use crate::io::Format;
 use crate::monitor::Stage;
@@ -66,6 +67,21 @@ pub struct Job {
     pub max_disk_bytes: Option<u64>,
     /// Folder for the work folder of the model.
     pub work_dir: RawPath,
+    /// What of it is drawn.
+    pub drawing: Drawing,
+}
+
+/// What of a model is drawn, once its result is in place.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Drawing {
+    /// How much.
+    pub wanted: Pages,
+    /// Folder of all that is drawn.
+    pub report: RawPath,
+    /// Number of the model in the journal.
+    pub number: i64,
+    /// Its path within the folder of the models, as text.
+    pub name: String,
 }
 
 /// A line of a worker.
@@ -78,6 +94,11 @@ pub enum Report {
         stage: Stage,
         /// How much of it is done, 0..1.
         share: f64,
+    },
+    /// A remark for the log.
+    Note {
+        /// In one line.
+        text: String,
     },
     /// The job is done, well or not; nothing follows.
     Ended(Box<Ending>),

@@ -31,11 +31,12 @@ pub use child::WORKER;
 pub use copy::copy_if_sound;
 pub use error::CatalogueError;
 pub use fleet::{Ahead, Ended, Fleet};
-pub use job::{Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Report, Task};
+pub use job::{Drawing, Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Report, Task};
 pub use journal::{
-    AttemptRow, FOLDER, Failure, JOURNAL, Journal, ModelRow, StateCount, Summary, Told, UnderWay,
+    AttemptRow, CauseGroup, FOLDER, Failure, JOURNAL, Journal, ListOrder, ListedModel, ModelRow,
+    OutcomeSum, StateCount, Summary, Told, Totals, UnderWay,
 };
-pub use options::{BatchOptions, Retry, Wanted};
+pub use options::{BatchOptions, Pages, Retry, Wanted};
 pub use run::RunEnding;
 pub use stamp::{Stamp, Stamped};
 pub use state::{Cause, Rung, State};

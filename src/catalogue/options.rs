@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use serde::{Deserialize, Serialize};
+
 use crate::catalogue::state::{Cause, State};
 use crate::catalogue::walk::Selection;
 use crate::io::Format;
@@ -16,6 +18,19 @@ pub struct Wanted {
     pub format: Option<Format>,
     /// Copy models with which nothing is wrong.
     pub only_broken: bool,
+}
+
+/// What is drawn of each model, for people.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Pages {
+    /// Nothing.
+    None,
+    /// Small pictures, before and after.
+    Thumbnails,
+    /// These, and a page.
+    #[default]
+    All,
 }
 
 /// Which settled models are done again though nothing has changed.
@@ -73,6 +88,10 @@ pub struct BatchOptions<'o> {
     pub model_timeout_ms: Option<u64>,
     /// The batch stops when more models have failed in this run.
     pub max_failures: Option<u64>,
+    /// What is drawn of each model that is done.
+    pub pages: Pages,
+    /// Folder of what is drawn.
+    pub report: PathBuf,
     /// When the batch stops, milliseconds since 1970.
     pub stop_at_ms: Option<u64>,
     /// What is done again.

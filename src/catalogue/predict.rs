@@ -107,6 +107,7 @@ impl Asking<'_> {
             deadline_ms: Some(self.fleet.now_ms().saturating_add(limit_ms)),
             stops: self.stops,
             working: &|_, _| {},
+            note: &|text| self.fleet.note(text),
         };
         let mut asked = match worker.take() {
             Some(worker) => worker,

@@ -368,6 +368,7 @@ fn watch_over(
         deadline_ms: options.model_timeout_ms.map(|ms| attempt.started_ms.saturating_add(ms)),
         stops: &|| stops.load(Ordering::Relaxed),
         working: &|stage, share| fleet.working(slot, stage, share),
+        note: &|text| fleet.note(text),
     };
     let exited = Worker::start(&options.program).map(|worker| worker.ask_last(job, &watch));
     // The one who listens outlives us.

@@ -49,9 +49,15 @@ impl Selection {
         Ok(Self { include: set_of(include)?, exclude: set_of(exclude)?, sizes })
     }
 
-    fn reason_against(&self, relative: &Path, bytes: u64) -> Option<Passed> {
+    /// Whether the path of a file is one of those that are taken, whatever its size.
+    #[must_use]
+    pub fn fits(&self, relative: &Path) -> bool {
         let is_wanted = self.include.is_empty() || self.include.is_match(relative);
-        if !is_wanted || self.exclude.is_match(relative) {
+        is_wanted && !self.exclude.is_match(relative)
+    }
+
+    fn reason_against(&self, relative: &Path, bytes: u64) -> Option<Passed> {
+        if !self.fits(relative) {
             return Some(Passed::Excluded);
         }
         match self.sizes {

@@ -7,19 +7,25 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use brickmend::catalogue::{
-    BatchOptions, BatchReport, CatalogueError, Cause, Fleet, Retry, RunEnding, Selection, Summary,
-    Wanted, run_batch,
+    BatchOptions, BatchReport, CatalogueError, Cause, Fleet, Pages, Retry, RunEnding, Selection,
+    Summary, Wanted, run_batch,
 };
 use brickmend::io::Format;
 use brickmend::repair::{Blame, Settings, TextureRule};
+use brickmend::report::report_folder;
 use brickmend::store::StoreError;
 use clap::Args;
+use jiff::ZonedDateTime;
+use jiff::civil::Time;
 
 use crate::cli::arguments::{FormatName, ResourceArguments, ResultArguments, parse_size};
+use crate::cli::config::Config;
 use crate::cli::exit_code::Exit;
 use crate::cli::fleet::Terminal;
 use crate::cli::progress::{Chatter, on_one_line};
+use crate::cli::report;
 use crate::cli::signals::Stop;
+use crate::cli::time::{next_at, parse_clock, parse_time};
 
 const EXIT_STATUS: &str = "\
 Exit status:
@@ -28,7 +34,7 @@ Exit status:
   3    done, and some models failed: see brickmend status
   5    the folder of the results, scratch or the journal unusable, also a full disk: run again to go on
   6    another batch works on this folder of results
-  7    stopped by --for or --max-failures: run again to go on
+  7    stopped by --for, --until or --max-failures: run again to go on
   130  interrupted (SIGINT), state saved: run again to go on
   143  asked to end (SIGTERM), state saved: run again to go on";
 
@@ -41,6 +47,32 @@ pub struct BatchArguments {
     /// Folder of the results, a tree like that of the models. The journal is in its .brickmend.
     #[arg(short, long, value_name = "DIR")]
     output: PathBuf,
+    /// Only the models that this file lists, one path a line, within the folder.
+    #[arg(long, value_name = "FILE", help_heading = "Models")]
+    files_from: Option<PathBuf>,
+    /// Do again what nothing changed about: failed, timeout, oom, review, degraded, all.
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models")]
+    retry: Vec<RetryName>,
+    /// Read all models and results again to see whether they changed.
+    #[arg(long, help_heading = "Models")]
+    rehash: bool,
+    #[command(flatten)]
+    settings: BatchSettings,
+    #[command(flatten)]
+    result: ResultArguments,
+    #[command(flatten)]
+    resources: ResourceArguments,
+    /// Tell what there is to do, and stop.
+    #[arg(long, help_heading = "Report")]
+    plan: bool,
+    /// Print where the catalogue stands as JSON on stdout; see docs/journal.md.
+    #[arg(long, help_heading = "Report")]
+    json: bool,
+}
+
+/// What of a batch may be set once for all nights.
+#[derive(Debug, Args)]
+pub struct BatchSettings {
     /// Format of all results [default: that of each model].
     #[arg(long, value_enum)]
     format: Option<FormatName>,
@@ -53,25 +85,12 @@ pub struct BatchArguments {
     /// No models whose path or name fits this pattern; may be given several times.
     #[arg(long, value_name = "PATTERN", help_heading = "Models")]
     exclude: Vec<String>,
-    /// Only the models that this file lists, one path a line, within the folder.
-    #[arg(long, value_name = "FILE", help_heading = "Models")]
-    files_from: Option<PathBuf>,
     /// Only models of this size and larger.
     #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Models")]
     min_size: Option<u64>,
     /// Only models of this size and smaller.
     #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Models")]
     max_size: Option<u64>,
-    /// Do again what nothing changed about: failed, timeout, oom, review, degraded, all.
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models")]
-    retry: Vec<RetryName>,
-    /// Read all models and results again to see whether they changed.
-    #[arg(long, help_heading = "Models")]
-    rehash: bool,
-    #[command(flatten)]
-    result: ResultArguments,
-    #[command(flatten)]
-    resources: ResourceArguments,
     /// Models at one time [default: one per thread].
     #[arg(long, value_name = "N", help_heading = "Resources")]
     jobs: Option<usize>,
@@ -88,12 +107,27 @@ pub struct BatchArguments {
     /// Stop after this time, such as 4h; the same command goes on.
     #[arg(long = "for", value_name = "TIME", value_parser = parse_time, help_heading = "Resources")]
     time: Option<u64>,
-    /// Tell what there is to do, and stop.
-    #[arg(long, help_heading = "Report")]
-    plan: bool,
-    /// Print where the catalogue stands as JSON on stdout; see docs/journal.md.
-    #[arg(long, help_heading = "Report")]
-    json: bool,
+    /// Stop at this time of the day, such as 06:00; the same command goes on.
+    #[arg(long, value_name = "HH:MM", value_parser = parse_clock, help_heading = "Resources")]
+    until: Option<Time>,
+    /// What is drawn of each model that is done: small pictures before and after, a page.
+    #[arg(long, value_enum, value_name = "WHAT", default_value_t = PagesName::All,
+          help_heading = "Report")]
+    pages: PagesName,
+    /// Draw nothing: as --pages none.
+    #[arg(long, conflicts_with = "pages", help_heading = "Report")]
+    no_pages: bool,
+}
+
+impl BatchArguments {
+    /// What is wanted of each model.
+    pub fn wanted(&self) -> Wanted {
+        Wanted {
+            settings: settings_of(&self.result),
+            format: self.settings.format.map(Format::from),
+            only_broken: !self.settings.all,
+        }
+    }
 }
 
 /// What is done again.
@@ -107,8 +141,29 @@ enum RetryName {
     All,
 }
 
+/// What is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, clap::ValueEnum)]
+enum PagesName {
+    /// Pictures and a page of each model.
+    All,
+    /// Pictures.
+    Thumbnails,
+    /// Nothing; the page of the catalogue is written all the same.
+    None,
+}
+
+impl From<PagesName> for Pages {
+    fn from(name: PagesName) -> Self {
+        match name {
+            PagesName::All => Self::All,
+            PagesName::Thumbnails => Self::Thumbnails,
+            PagesName::None => Self::None,
+        }
+    }
+}
+
 /// Runs the command.
-pub fn run(arguments: &BatchArguments, chatter: &Chatter) -> ExitCode {
+pub fn run(arguments: &BatchArguments, config: &Config, chatter: &Chatter) -> ExitCode {
     let stop = match Stop::listen() {
         Ok(stop) => stop,
         Err(error) => {
@@ -117,12 +172,13 @@ pub fn run(arguments: &BatchArguments, chatter: &Chatter) -> ExitCode {
         }
     };
     let terminal = Terminal::new(*chatter, stop.clone());
-    let report = batch(arguments, &terminal);
+    let report = batch(arguments, config, &terminal);
     terminal.clear();
     match report {
-        Ok(report) => {
-            tell(&report, arguments.json, chatter);
-            exit_of(&report, &stop).into()
+        Ok(batch) => {
+            tell(&batch, arguments.json, chatter);
+            let page = write_page(&batch, arguments, chatter);
+            page.unwrap_or_else(|| exit_of(&batch, &stop)).into()
         }
         Err(error) => {
             chatter.error(&error);
@@ -134,31 +190,59 @@ pub fn run(arguments: &BatchArguments, chatter: &Chatter) -> ExitCode {
     }
 }
 
-fn batch(arguments: &BatchArguments, fleet: &Terminal) -> Result<BatchReport, CatalogueError> {
+/// Writes the page of the catalogue; how the process ends where that fails.
+fn write_page(batch: &BatchReport, arguments: &BatchArguments, chatter: &Chatter) -> Option<Exit> {
+    batch.ending?;
+    match report::write(&arguments.output, None) {
+        Ok(path) => {
+            chatter.say(&format!("report: {}", on_one_line(&path.display().to_string())));
+            None
+        }
+        Err(error) => {
+            chatter.error(&error);
+            Some(Exit::from(error.blame()))
+        }
+    }
+}
+
+impl BatchSettings {
+    /// When the batch stops: by the earlier of --for and --until.
+    fn stop_at_ms(&self, now_ms: u64) -> Option<u64> {
+        let after = self.time.map(|time| now_ms.saturating_add(time));
+        let at = self.until.map(|time| next_at(&ZonedDateTime::now(), time));
+        after.into_iter().chain(at).min()
+    }
+}
+
+fn batch(
+    arguments: &BatchArguments,
+    config: &Config,
+    fleet: &Terminal,
+) -> Result<BatchReport, CatalogueError> {
     let limits = arguments.resources.limits();
     let program = std::env::current_exe()
         .map_err(|source| CatalogueError::Worker { program: PathBuf::new(), source })?;
-    let wanted = Wanted {
-        settings: settings_of(&arguments.result),
-        format: arguments.format.map(Format::from),
-        only_broken: !arguments.all,
-    };
-    let sizes = (arguments.min_size.unwrap_or(0), arguments.max_size.unwrap_or(u64::MAX));
+    let all = arguments.wanted();
+    let wanted = |relative: &Path| config.wanted(relative, all);
+    let settings = &arguments.settings;
+    let sizes = (settings.min_size.unwrap_or(0), settings.max_size.unwrap_or(u64::MAX));
     let words = std::env::args_os().map(|word| word.to_string_lossy().into_owned());
     let options = BatchOptions {
         source: arguments.source.clone(),
         target: arguments.output.clone(),
-        wanted: &|_| wanted,
-        selection: Selection::new(&arguments.include, &arguments.exclude, Some(sizes))?,
+        wanted: &wanted,
+        selection: Selection::new(&settings.include, &settings.exclude, Some(sizes))?,
         listed: arguments.files_from.as_deref().map(read_list).transpose()?,
         max_memory_bytes: limits.max_memory_bytes,
-        max_disk_bytes: arguments.max_disk,
-        jobs: arguments.jobs.unwrap_or(limits.threads).max(1),
+        max_disk_bytes: settings.max_disk,
+        jobs: settings.jobs.unwrap_or(limits.threads).max(1),
         threads: limits.threads,
         work_dir: limits.work_dir,
-        model_timeout_ms: arguments.model_timeout,
-        max_failures: arguments.max_failures,
-        stop_at_ms: arguments.time.map(|time| fleet.now_ms().saturating_add(time)),
+        model_timeout_ms: settings.model_timeout,
+        max_failures: settings.max_failures,
+        pages: if settings.no_pages { Pages::None } else { settings.pages.into() },
+        report: report_folder(&arguments.output),
+        stop_at_ms: settings.stop_at_ms(fleet.now_ms()),
         retry: retry(&arguments.retry),
         rehash: arguments.rehash,
         only_plan: arguments.plan,
@@ -228,41 +312,11 @@ pub fn text_of(summary: &Summary) -> String {
     }
     text
 }
-
-/// Milliseconds of a time such as 90s, 10m or 2h.
-fn parse_time(text: &str) -> Result<u64, String> {
-    let refuse = || format!("expected a time such as 90s, 10m or 2h, found {text:?}");
-    let split = text.find(|c: char| !c.is_ascii_digit() && c != '.').unwrap_or(text.len());
-    let (number, unit) = text.split_at(split);
-    let number: f64 = number.parse().map_err(|_| refuse())?;
-    let seconds = match unit.trim() {
-        "ms" => 0.001,
-        "" | "s" => 1.0,
-        "m" | "min" => 60.0,
-        "h" => 3600.0,
-        "d" => 86400.0,
-        _ => return Err(refuse()),
-    };
-    Ok((number * seconds * 1000.0) as u64)
-}
-
 /// The settings of a batch: its results stand on their own, with copies of their images.
 fn settings_of(arguments: &ResultArguments) -> Settings {
     let settings = arguments.settings();
     match arguments.textures {
         None => Settings { textures: TextureRule::Copy, ..settings },
         Some(_) => settings,
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn times_have_units() {
-        assert_eq!(parse_time("90s"), Ok(90_000));
-        assert_eq!(parse_time("1.5h"), Ok(5_400_000));
-        assert!(parse_time("soon").is_err());
     }
 }

@@ -2,8 +2,17 @@
 
 /// Peak resident memory in bytes (VmHWM), where the kernel tells it.
 pub fn peak_resident_bytes() -> Option<u64> {
+    of_status("VmHWM:")
+}
+
+/// Resident memory now, in bytes (VmRSS), where the kernel tells it.
+pub fn resident_bytes() -> Option<u64> {
+    of_status("VmRSS:")
+}
+
+fn of_status(name: &str) -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
-    let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;
+    let line = status.lines().find_map(|line| line.strip_prefix(name))?;
     let kib: u64 = line.trim().strip_suffix("kB")?.trim().parse().ok()?;
     Some(kib << 10)
 }

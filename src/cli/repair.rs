@@ -10,7 +10,10 @@ use brickmend::repair::{
     Levels, Limits, Outcome, PartsOutcome, PartsRule, RepairError, Settings, Verdict, repair,
     repair_levels, repair_parts,
 };
-use brickmend::report::{OpenSource, PreviewOptions, write_preview};
+use brickmend::report::{
+    ModelPage, OpenSource, PageOptions, PreviewOptions, ReportError, write_model_page,
+    write_preview,
+};
 use brickmend::store::Scratch;
 use clap::Args;
 
@@ -34,7 +37,7 @@ pub struct RepairArguments {
     /// Levels of detail: one file for each of these values of --decimate, such as
     /// 0,0.1,0.5,2cells, from one run; for -o out.ply they are out.0cells.ply, out.0.1cells.ply and
     /// so on.
-    #[arg(long, value_name = "LENGTHS", conflicts_with_all = ["decimate", "max_triangles", "preview"],
+    #[arg(long, value_name = "LENGTHS", conflicts_with_all = ["decimate", "max_triangles", "preview", "report"],
           help_heading = "Result")]
     lod: Option<Levels>,
     #[command(flatten)]
@@ -53,6 +56,9 @@ pub struct RepairArguments {
     /// Draw input beside output into a PNG or EXR file.
     #[arg(long, value_name = "FILE", help_heading = "Report")]
     preview: Option<PathBuf>,
+    /// Write a page of the model: verdict, what was found and done, before and after.
+    #[arg(long, value_name = "FILE.html", help_heading = "Report")]
+    report: Option<PathBuf>,
     /// Draw the edges of the triangles as well.
     #[arg(long, requires = "preview", help_heading = "Report")]
     preview_edges: bool,
@@ -214,6 +220,13 @@ fn finish(arguments: &RepairArguments, outcomes: &mut [Outcome], chatter: &Chatt
     for outcome in outcomes.iter_mut() {
         outcome.memory.peak_bytes = peak_resident_bytes();
     }
+    if let Some(path) = &arguments.report
+        && let [outcome] = &*outcomes
+        && let Err(error) = write_page(arguments, outcome, path)
+    {
+        chatter.error(&error);
+        exit = Exit::from(error.blame());
+    }
     if arguments.json {
         let text = match &*outcomes {
             [outcome] if arguments.lod.is_none() => serde_json::to_string_pretty(outcome),
@@ -269,6 +282,25 @@ fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
     write_preview(path, input, Some(output), &options, &Void)
         .map(|_| ())
         .map_err(|error| error.to_string())
+}
+
+/// Writes the page of the model; a sixth of the memory budget is for pictures and meshes.
+fn write_page(
+    arguments: &RepairArguments,
+    outcome: &Outcome,
+    path: &Path,
+) -> Result<(), ReportError> {
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let name = arguments.input.file_name().unwrap_or_default().to_string_lossy();
+    let model = ModelPage {
+        name: &name,
+        input: &arguments.input,
+        output: &arguments.output,
+        outcome: Some(outcome),
+        back: None,
+    };
+    let options = PageOptions::large(arguments.resources.max_memory / 6);
+    write_model_page(path, &model, &options, &Scratch::new(folder), &Void)
 }
 
 /// A refusal of the command line's own.

@@ -7,9 +7,11 @@ use std::process::ExitCode;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use brickmend::catalogue::{Job, Report, do_job};
+use brickmend::catalogue::{Job, Made, Report, do_job};
 use brickmend::monitor::{Monitor, Stage};
 use brickmend::repair::Outcome;
+use brickmend::report::{Gallery, ModelPage};
+use brickmend::store::Scratch;
 use clap::Args;
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
@@ -21,6 +23,9 @@ use crate::cli::stage_clock::StageClock;
 
 /// Progress is reported at most this often.
 const REPORT_INTERVAL: Duration = Duration::from_millis(250);
+
+/// Pages take this part of the budget, and readers as much again.
+const PAGE_SHARE: u64 = 6;
 
 /// Arguments of `brickmend worker`.
 #[derive(Debug, Args)]
@@ -63,9 +68,42 @@ fn work(job: &Job, stop: Stop) {
         outcome.memory.peak_bytes = peak_resident_bytes();
     };
     let mut ending = do_job(job, &speaker, &stamp);
+    draw(job, &ending.made, &speaker);
     ending.peak_bytes = peak_resident_bytes();
     ending.cpu_seconds = cpu_seconds();
     say(&Report::Ended(Box::new(ending)));
+}
+
+/// Draws the model beside its result, which is in place. Without pictures it is as good: what stands
+/// in their way is said, and no more.
+fn draw(job: &Job, made: &Made, monitor: &dyn Monitor) {
+    let drawing = &job.drawing;
+    let gallery = Gallery::new(&drawing.report.to_path(), drawing.number);
+    let outcome = match made {
+        Made::Repaired { figures, .. } => serde_json::from_str::<Outcome>(&figures.outcome).ok(),
+        Made::Copied { .. } => None,
+        Made::Estimate(_) => return,
+        // Of an earlier result.
+        Made::Nothing { .. } => {
+            let _ = gallery.clear();
+            return;
+        }
+    };
+    let (input, output) = (job.input.to_path(), job.output.to_path());
+    let model = ModelPage {
+        name: &drawing.name,
+        input: &input,
+        output: &output,
+        outcome: outcome.as_ref(),
+        back: None,
+    };
+    let scratch = Scratch::new(&job.work_dir.to_path());
+    let share_bytes = job.max_memory_bytes / PAGE_SHARE;
+    let drawn = gallery.write(&model, drawing.wanted, share_bytes, &scratch, monitor);
+    if let Err(error) = drawn {
+        let _ = gallery.clear();
+        say(&Report::Note { text: format!("{}: no page of it: {error}", drawing.name) });
+    }
 }
 
 /// A parent that hears nothing any more has ended, and so will we.

@@ -138,6 +138,8 @@ pub struct StageReport {
     pub seconds: f64,
     /// Time of the processors, all threads together.
     pub cpu_seconds: f64,
+    /// The most that was resident, of what the caller saw: it looks now and then.
+    pub resident_bytes: Option<u64>,
 }
 
 /// What the run held.

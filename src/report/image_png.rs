@@ -28,15 +28,20 @@ const LINE_SAMPLES: f64 = 1.0;
 type Srgb = [u8; 3];
 
 /// How the picture is cut.
-struct Layout {
+pub(crate) struct Layout {
     grid: Grid,
-    width_px: u32,
-    height_px: u32,
+    /// Of the whole picture.
+    pub(crate) width_px: u32,
+    /// See `width_px`.
+    pub(crate) height_px: u32,
     band_rows_px: u32,
 }
 
 impl Layout {
-    fn new<E: std::error::Error>(options: &PreviewOptions) -> Result<Self, PreviewError<E>> {
+    /// Cuts it so that the share holds a band.
+    pub(crate) fn new<E: std::error::Error>(
+        options: &PreviewOptions,
+    ) -> Result<Self, PreviewError<E>> {
         let grid = Grid::of(options.views);
         let side_px = grid.columns * options.width_px;
         let width_px = 2 * side_px + SEPARATOR_PX;
@@ -51,6 +56,11 @@ impl Layout {
         let height_px = grid.rows * options.height_px;
         Ok(Self { grid, width_px, height_px, band_rows_px: rows as u32 })
     }
+
+    /// Width and height of one view in samples.
+    pub(crate) fn samples_of_view(options: &PreviewOptions) -> (u32, u32) {
+        (options.width_px * OVERSAMPLING, options.height_px * OVERSAMPLING)
+    }
 }
 
 /// Writes the picture.
@@ -60,8 +70,7 @@ pub(crate) fn write_png<E: std::error::Error>(
     options: &PreviewOptions,
 ) -> Result<PreviewStats, PreviewError<E>> {
     let layout = Layout::new(options)?;
-    let size = (options.width_px * OVERSAMPLING, options.height_px * OVERSAMPLING);
-    let cameras = scene.cameras(options, size)?;
+    let cameras = scene.cameras(options, Layout::samples_of_view(options))?;
     let staged = StagedFile::create(path)?;
     let failed = |error: png::EncodingError| staged.failed(io::Error::from(error));
     let mut file = BufWriter::new(staged.file());
@@ -88,7 +97,7 @@ pub(crate) fn write_png<E: std::error::Error>(
 }
 
 /// Draws band after band, top down, and hands out their rows.
-fn draw_bands<E: std::error::Error>(
+pub(crate) fn draw_bands<E: std::error::Error>(
     scene: &Scene<'_, '_, E>,
     options: &PreviewOptions,
     layout: &Layout,

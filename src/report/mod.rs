@@ -1,14 +1,24 @@
-//! What people look at: pictures of a repair, before beside after.
+//! What people look at: pictures of a repair, a page of a model, a page of a catalogue.
 //!
-//! In:      meshes as streams ([`crate::mesh::MeshSource`]), never the stages that made them.
-//! Out:     picture files, put in place only when complete.
+//! In:      meshes as streams ([`crate::mesh::MeshSource`]), outcomes, the journal; never the stages
+//!          that made them.
+//! Out:     pictures and pages, put in place only when complete.
 //! Memory:  what the caller states as a share; see [`preview`].
 
+mod catalogue_page;
+mod error;
+mod html;
 mod image_exr;
 mod image_png;
 mod image_staged;
+mod light_mesh;
+mod model_page;
+mod pictures;
 pub mod preview;
 
+pub use catalogue_page::{FOLDER, INDEX, report_folder, write_catalogue_page};
+pub use error::ReportError;
+pub use model_page::{Gallery, ModelPage, PageOptions, write_model_page};
 pub use preview::{
     OpenSource, PreviewError, PreviewOptions, PreviewStats, Side, SideStats, UpAxis, Views,
     write_preview,

@@ -3,6 +3,8 @@
 pub mod breakage;
 pub mod disk_watch;
 pub mod image;
+pub mod library;
+pub mod page;
 pub mod program;
 pub mod run;
 pub mod schema;

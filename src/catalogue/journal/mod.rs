@@ -10,12 +10,14 @@
 mod attempts;
 mod enrol;
 mod finish;
+mod listing;
 mod models;
 mod summary;
 
 pub use attempts::AttemptRow;
 pub use enrol::{Enrolled, Seen};
 pub use finish::Finished;
+pub use listing::{CauseGroup, ListOrder, ListedModel, OutcomeSum, Totals};
 pub use models::ModelRow;
 pub use summary::{Failure, StateCount, Summary, Told, UnderWay};
 

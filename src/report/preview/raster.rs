@@ -95,7 +95,8 @@ impl<P: Copy> Band<P> {
         for y in row..row_end {
             let along = edges.map(|edge| edge.row(y as f64 + 0.5));
             let start = (y - self.first_row) * self.width;
-            for x in column..column_end {
+            let (first, end) = columns(edges, &along, (column, column_end));
+            for x in first..end {
                 let centre = x as f64 + 0.5;
                 let weights: [f64; 3] = std::array::from_fn(|i| edges[i].at(along[i], centre));
                 if !(0..3).all(|i| edges[i].owns(weights[i])) {
@@ -124,6 +125,23 @@ impl<P: Copy> Band<P> {
     }
 }
 
+/// The columns of a row that may lie inside of all edges, within `column..end`: a sample more on each
+/// side than is, so that no rounding leaves one out.
+fn columns(edges: &[Slope; 3], along: &[f64; 3], (column, end): (usize, usize)) -> (usize, usize) {
+    let (mut lo, mut hi) = (column as f64, end as f64);
+    for (edge, row) in edges.iter().zip(along) {
+        let crossing = edge.x + row / edge.dy;
+        if edge.dy > 0.0 {
+            hi = hi.min(crossing + 1.5);
+        } else if edge.dy < 0.0 {
+            lo = lo.max(crossing - 1.5);
+        }
+    }
+    // A cast takes what is below zero for zero.
+    ((lo as usize).max(column), (hi as usize).min(end))
+}
+
+#[inline]
 fn is_nearer<P>(depth: f32, back: bool, sample: &Sample<P>) -> bool {
     match (back, sample.back) {
         (false, true) => depth <= sample.depth + SAME_DEPTH,
@@ -158,14 +176,17 @@ impl Slope {
         Self { x: lo.x, y: lo.y, dx: sign * dx, dy: sign * dy, closed, mesh, length }
     }
 
+    #[inline]
     fn row(&self, y: f64) -> f64 {
         self.dx * (y - self.y)
     }
 
+    #[inline]
     fn at(&self, row: f64, x: f64) -> f64 {
         row - self.dy * (x - self.x)
     }
 
+    #[inline]
     fn owns(&self, weight: f64) -> bool {
         weight > 0.0 || (weight == 0.0 && self.closed)
     }
