@@ -46,16 +46,18 @@ impl Run<'_> {
             };
             let file = crate::io::open(workspace.part(), resources.scratch, &options);
             let mut file = file.map_err(RepairError::ReadBack)?;
-            findings.deviation = self.deviation(&mut *file, workspace, findings, resources)?;
+            let files = workspace.files();
+            let soup = FileState::find(&files, SOUP)?;
+            findings.deviation = self.deviation((soup, &mut *file), findings, resources)?;
         }
         Ok(Vec::new())
     }
 
-    /// Measures what `file` gives: the written file, or what it has of a part.
+    /// Measures what `file` gives, the written file or what it has of a part, against the `soup` that
+    /// was read.
     pub(crate) fn deviation<S: MeshSource<Error = IoError> + ?Sized>(
         &self,
-        file: &mut S,
-        workspace: &Workspace,
+        (soup, file): (&FileState, &mut S),
         findings: &Findings,
         resources: &Resources,
     ) -> Result<Option<Deviation>, RepairError> {
@@ -63,7 +65,7 @@ impl Run<'_> {
         let means = Means { scratch, pool, share_bytes: resources.share_bytes / 4 * 3, monitor };
         // Contouring writes neighbours after each other, and models list them so as a rule.
         let asked = SurfaceOptions { samples: SAMPLES, creases: false, is_coherent: true };
-        let soup = Spool::open(scratch, FileState::find(&workspace.files(), SOUP)?)?;
+        let soup = Spool::open(scratch, soup)?;
         let mut soup = SoupSource::new(&soup);
         let before =
             Surface::read(&mut soup, &SurfaceOptions { is_coherent: false, ..asked }, &means);

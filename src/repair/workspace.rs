@@ -156,6 +156,12 @@ impl Workspace {
         Ok(workspace)
     }
 
+    /// The scratch of a folder inside of this one.
+    #[must_use]
+    pub fn scratch_of(&self, inner: Inner) -> Scratch {
+        self.scratch.beside(&self.folder.join(inner.name()))
+    }
+
     /// The folders of ours in this one.
     fn inner_folders(&self) -> Result<Vec<(Inner, PathBuf)>, StoreError> {
         let failed = |e| StoreError::io("list", &self.folder, e);

@@ -7,7 +7,18 @@ use rkyv::{Archive, Deserialize, Serialize};
 use crate::store::{Digest, StoreError};
 
 /// A file as it has to be found again.
-#[derive(Clone, Debug, Default, PartialEq, Eq, Archive, Serialize, Deserialize)]
+#[derive(
+    Clone,
+    Debug,
+    Default,
+    PartialEq,
+    Eq,
+    Archive,
+    Serialize,
+    Deserialize,
+    serde::Serialize,
+    serde::Deserialize,
+)]
 pub struct FileState {
     /// Its name in the work folder.
     pub name: String,

@@ -29,7 +29,7 @@ use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
 use crate::contour::Method;
-use crate::ingest::{Converted, LOOK_MATERIALS, Scattered, scatter};
+use crate::ingest::{Converted, LOOK_MATERIALS, SOUP, Scattered, scatter};
 use crate::io::{
     Format, IoError, LookMap, MATERIALS, Palette, ReadOptions, Sink, Source, WriteOptions,
     check_output, library_name, lost_of_materials,
@@ -151,6 +151,9 @@ struct Done {
     /// What is in front of it, and what there is with it.
     before: Numbered,
     after: Numbered,
+    /// Its triangles as they were read.
+    soup: FileState,
+    resumptions: u32,
 }
 
 impl Assembly<'_> {
@@ -350,7 +353,10 @@ impl Assembly<'_> {
             findings.is_split = is_split;
             findings.lost_maps.clone_from(&lost);
             let report = PartReport { number, name, places: at.count };
-            let done = Done { report, before, after: there };
+            let files = workspace.files();
+            let soup = FileState::find(&files, SOUP)?.clone();
+            let resumptions = workspace.resumptions();
+            let done = Done { report, before, after: there, soup, resumptions };
             found.push(
                 &serde_json::to_string(&(done, findings)).expect("plain records serialise"),
             )?;
@@ -425,10 +431,9 @@ impl Assembly<'_> {
                 serde_json::from_str(&text).map_err(|error| {
                     StoreError::damaged(FOUND.as_ref(), 0, "findings", error.to_string())
                 })?;
-            let Done { report, before, after } = done;
+            let Done { report, before, after, soup, resumptions } = done;
             let (of, number, name) = (&model.scattered, report.number, report.name.clone());
             let run = self.run_of(Feed::Part { of, number, name }, self.settings, 0.0);
-            let workspace = self.open_inner(Inner::Part(report.number), true)?;
             let triangles = after.triangles - before.triangles;
             self.recording.begin(Stage::Verify, 2 * triangles);
             let mut open =
@@ -438,15 +443,17 @@ impl Assembly<'_> {
             if self.settings.deviation {
                 self.recording.begin(Stage::Deviate, triangles);
                 let mut file = measured.part(before, after).map_err(RepairError::ReadBack)?;
-                let inner = Resources { scratch: workspace.scratch(), ..*resources };
-                findings.deviation = run.deviation(&mut file, &workspace, &findings, &inner)?;
+                let scratch = self.workspace.scratch_of(Inner::Part(report.number));
+                let inner = Resources { scratch: &scratch, ..*resources };
+                findings.deviation = run.deviation((&soup, &mut file), &findings, &inner)?;
                 self.recording.end(Stage::Deviate);
             }
             findings.written.vertices = after.vertices - before.vertices;
             findings.written.triangles = triangles;
             findings.written.file = *file;
             run.count_scratch(self.workspace);
-            let mut concluded_part = conclude(&run, &workspace, &findings, rebuilt);
+            let mut concluded_part = conclude(&run, self.workspace, &findings, rebuilt);
+            concluded_part.resume.resumptions = resumptions;
             outcome.add(concluded_part.verdict, report.places, triangles);
             concluded_part.part = Some(report);
             concluded
