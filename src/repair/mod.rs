@@ -13,6 +13,7 @@ mod depth;
 mod error;
 mod estimate;
 mod finish;
+mod inner;
 mod inspect;
 mod inspection;
 mod length;
@@ -36,6 +37,7 @@ mod verdict;
 mod verification;
 mod verify_file;
 mod workspace;
+mod writing;
 
 pub use deeper::DepthTrial;
 pub use error::{Blame, RepairError};

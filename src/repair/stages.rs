@@ -6,38 +6,34 @@ use std::sync::PoisonError;
 use serde::{Deserialize, Serialize};
 
 use crate::bridge::{MendStats, Mended, ThickenStats};
-use crate::contour::{
-    CELLS, ContourOptions, ContourStats, SURFACE, WriteProgress, place_vertices, separate,
-    write_surface,
-};
+use crate::contour::{CELLS, ContourOptions, ContourStats, place_vertices, separate};
 use crate::deviate::Deviation;
 use crate::hidden::HiddenStats;
 use crate::ingest::{
     Bins, Converted, LeftOut, SettleStats, Soup, SoupFacts, SoupMeasure, drop_fins, fill_bins,
     read_soup, settle,
 };
-use crate::io::{Format, IoError, ReadOptions, check_output};
-use crate::mesh::{CornerForm, LengthUnit, MeshSink, MeshSource, SinkFile, SinkStats};
-use crate::monitor::{Counter, Monitor};
+use crate::io::{IoError, ReadOptions};
+use crate::mesh::{LengthUnit, MeshSource, SinkFile, SinkStats};
+use crate::monitor::Monitor;
 use crate::octree::{Domain, Flips};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::choose::{Trials, most_trials};
 use crate::repair::deeper::DepthTrial;
 use crate::repair::depth::choose_domain;
-use crate::repair::finish::broken_promises;
 use crate::repair::length::Ruler;
 use crate::repair::measuring::SAMPLES;
 use crate::repair::outcome::Outcome;
 use crate::repair::run::{Feed, Run};
 use crate::repair::settings::Settings;
-use crate::repair::step::{OUTPUT_PART, Step};
+use crate::repair::step::Step;
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, ScanStats, scan};
 use crate::sign::{FillRule, FloodStats, Flooded, SIGNS, SignStats, assign_signs, flood};
 use crate::store::{BrickFile, FileState, Resources, StoreError};
 use crate::transfer::{BORDERS, BorderStats};
-use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
+use crate::verify::Proof;
 
 /// A level of detail whose file is in its place.
 #[derive(Clone, Debug, Serialize, Deserialize)]
@@ -409,113 +405,6 @@ impl Run<'_> {
         let more = self.has_more_levels(findings);
         handles.signs.take_if(|signs| !more || signs.state().is_some());
         Ok(hand_on(surface, &mut handles.surface))
-    }
-
-    fn write(
-        &self,
-        workspace: &Workspace,
-        findings: &mut Findings,
-        handles: &mut Handles,
-        resources: &Resources,
-    ) -> Result<Vec<FileState>, RepairError> {
-        let is_painted = self.attributes(findings).any();
-        // What is painted begins anew: the long part of it lies in spools.
-        let start = WriteProgress::noted(resources).filter(|_| !is_painted);
-        let (part, scratch) = (workspace.part(), resources.scratch);
-        let write_options = self.write_options(workspace, findings)?;
-        findings.lost_maps = self.lost_maps(&write_options, workspace)?;
-        let sink = match &start {
-            Some(noted) => {
-                crate::io::reopen(part, self.format, scratch, &write_options, &noted.sink)
-            }
-            None => crate::io::create(part, self.format, scratch, &write_options),
-        };
-        let mut sink = sink.map_err(RepairError::Output)?;
-        findings.is_split = sink.corner_form() == CornerForm::OfVertices;
-        self.write_into(workspace, findings, (handles, start), &mut *sink, resources)?;
-        let written = sink.finish().map_err(RepairError::Output)?;
-        self.recording.count(Counter::OutputBytesWritten, written.file.bytes);
-        findings.written = written;
-        Ok(vec![FileState {
-            name: OUTPUT_PART.to_owned(),
-            len_bytes: written.file.bytes,
-            records: written.triangles,
-            root: written.file.digest,
-        }])
-    }
-
-    /// Hands the surface to a sink, from its start or from where an earlier run was.
-    pub(crate) fn write_into<S: MeshSink<Error = IoError> + ?Sized>(
-        &self,
-        workspace: &Workspace,
-        findings: &mut Findings,
-        (handles, start): (&mut Handles, Option<WriteProgress>),
-        sink: &mut S,
-        resources: &Resources,
-    ) -> Result<(), RepairError> {
-        if self.attributes(findings).any() {
-            self.paint(workspace, findings, sink, resources)?;
-        } else {
-            let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
-            let surface = open_bricks(&mut handles.surface, SURFACE, workspace, resources)?;
-            let placed = (&findings.placed, start);
-            let (domain, options) = (findings.domain(), self.contour_options(findings));
-            findings.contour =
-                write_surface((cells, surface), domain, &options, placed, sink, resources)
-                    .map_err(RepairError::from_write)?;
-        }
-        (handles.cells, handles.surface) = (None, None);
-        Ok(())
-    }
-
-    fn prove(
-        &self,
-        workspace: &Workspace,
-        findings: &mut Findings,
-        resources: &Resources,
-    ) -> Result<Vec<FileState>, RepairError> {
-        // A coordinate may change and the surface stay sound: so the bytes are checked as well.
-        check_output(workspace.part(), &findings.written.file, resources.scratch)?;
-        let share_bytes = resources.share_bytes / 4;
-        let options = match self.format {
-            // Nodes say what a unit is; numbers are proved as they were written.
-            Format::Glb => ReadOptions::by_itself(share_bytes),
-            _ => ReadOptions::in_scene(share_bytes),
-        };
-        let mut open = || {
-            crate::io::open(workspace.part(), resources.scratch, &options)
-                .map(|source| source as ProvedSource<'static, IoError>)
-        };
-        self.prove_source(&mut open, workspace, findings, resources)?;
-        Ok(Vec::new())
-    }
-
-    /// Proves what `open` gives: the whole file, or what it has of one part.
-    pub(crate) fn prove_source(
-        &self,
-        open: &mut dyn FnMut() -> Result<ProvedSource<'static, IoError>, IoError>,
-        workspace: &Workspace,
-        findings: &mut Findings,
-        resources: &Resources,
-    ) -> Result<(), RepairError> {
-        let outward = match self.settings.fill_rule {
-            // What lies behind panes is a hollow.
-            FillRule::Solid if !findings.has_panes() => Outward::AllPositive,
-            _ => Outward::AlternatesWithNesting,
-        };
-        let vertices = if findings.is_split { Vertices::Positions } else { Vertices::Numbers };
-        let share_bytes = resources.share_bytes / 2;
-        let proof_options = ProofOptions { share_bytes, outward, vertices, intersections: true };
-        let proof = prove(open, resources.scratch, &proof_options, resources.pool, self.recording)
-            .map_err(RepairError::from_verify)?;
-        // What other methods do not promise is no bug: the outcome tells it.
-        let failures = broken_promises(&proof);
-        if failures.is_empty() || self.settings.method.caveat().is_some() {
-            findings.proof = Some(proof);
-            return Ok(());
-        }
-        let folder = workspace.folder().to_path_buf();
-        Err(RepairError::ProofFailed { failures: failures.join("; "), folder })
     }
 }
 

@@ -17,6 +17,7 @@ use crate::io::{ASIDE, IoError, check_output};
 use crate::mesh::SinkFile;
 use crate::monitor::Monitor;
 use crate::repair::RepairError;
+use crate::repair::inner::Inner;
 use crate::repair::lock::{LOCK, lock_folder};
 use crate::repair::settings::Limits;
 use crate::repair::standing::{
@@ -28,43 +29,8 @@ use crate::store::{
     load_manifest, save_manifest, sync_folder,
 };
 
-/// What names of the folders of parts begin with.
-const PART_FOLDER: &str = "part-";
-/// Name of the folder in which the whole is looked at.
-const WHOLE_FOLDER: &str = "whole";
 /// Ending of work folders.
 const ENDING: &str = "brickmend";
-
-/// A work folder inside of another one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Inner {
-    /// That of the whole model.
-    Whole,
-    /// That of the part with this number.
-    Part(u32),
-}
-
-impl Inner {
-    fn name(self) -> String {
-        match self {
-            Self::Whole => WHOLE_FOLDER.to_owned(),
-            Self::Part(number) => format!("{PART_FOLDER}{number}"),
-        }
-    }
-
-    /// The folder with this name.
-    pub fn named(name: &str) -> Option<Self> {
-        let of_number = |number: &str| number.parse().ok().map(Self::Part);
-        match name {
-            WHOLE_FOLDER => Some(Self::Whole),
-            name => name.strip_prefix(PART_FOLDER).and_then(of_number),
-        }
-    }
-
-    fn is_below(self, count: u32) -> bool {
-        matches!(self, Self::Part(number) if number < count)
-    }
-}
 
 /// A locked work folder.
 pub struct Workspace {

@@ -16,9 +16,11 @@
 //! step before the last two: so a run that was stopped goes on within a part, and passes over those
 //! that are done. Only reading the file, and writing and proving the output, are begun anew.
 
+mod assemble;
 mod outcome;
 mod part_sink;
 mod places;
+mod proving;
 mod slices;
 mod survey;
 
@@ -29,37 +31,28 @@ use rayon::ThreadPool;
 use serde::{Deserialize, Serialize};
 
 use crate::contour::Method;
-use crate::ingest::{Converted, LOOK_MATERIALS, SOUP, Scattered, scatter};
-use crate::io::{
-    Format, IoError, LookMap, MATERIALS, Palette, ReadOptions, Sink, Source, WriteOptions,
-    check_output, library_name, lost_of_materials,
-};
-use crate::mesh::{CornerForm, SinkFile};
-use crate::monitor::{Counter, Monitor, Recording, Stage};
+use crate::ingest::{Converted, Scattered, scatter};
+use crate::io::{Format, Palette, ReadOptions, WriteOptions, library_name};
+use crate::monitor::{Monitor, Recording, Stage};
 use crate::repair::RepairError;
 use crate::repair::depth::choose_domain;
-use crate::repair::finish::conclude;
+use crate::repair::inner::Inner;
 use crate::repair::length::Ruler;
 use crate::repair::levels::Level;
-use crate::repair::outcome::{Outcome, Verdict};
+use crate::repair::outcome::Outcome;
 pub use crate::repair::parts::outcome::{LeftOut, PartReport, PartsOutcome};
-use crate::repair::parts::part_sink::{Numbered, PartSink};
+use crate::repair::parts::part_sink::Numbered;
 use crate::repair::parts::places::Places;
-use crate::repair::parts::slices::Slices;
 use crate::repair::plan::MemoryPlan;
 use crate::repair::run::{
     Feed, InputIdentity, MOST_WAYS_BACK, Run, keep_input, part_key, run_key, start_threads,
 };
 use crate::repair::settings::{Limits, Settings, TextureRule};
-use crate::repair::stages::{Findings, Handles, check_converted};
-use crate::repair::standing::{CONCLUDED, FOUND};
-use crate::repair::step::Step;
+use crate::repair::stages::check_converted;
+use crate::repair::standing::CONCLUDED;
 use crate::repair::surfaces::{Beside, keep_libraries};
-use crate::repair::workspace::{Inner, Workspace};
-use crate::store::{
-    Accountant, FileState, NoCheckpoints, Resources, Spool, StoreError, Texts, TextsWriter,
-};
-use crate::verify::ProvedSource;
+use crate::repair::workspace::Workspace;
+use crate::store::{Accountant, FileState, NoCheckpoints, Resources, Spool, StoreError, Texts};
 
 /// Cells of a part are no smaller than those of the whole over this.
 const FINER_THAN_WHOLE: f64 = 8.0;
@@ -304,165 +297,6 @@ impl Assembly<'_> {
             self.open_inner(inner, true)?.go_back_for(path)?;
         }
         Ok(())
-    }
-
-    /// Writes all parts into one file, and proves each; what came of them, and the spool of their
-    /// outcomes.
-    fn assemble(
-        &self,
-        model: &mut Model,
-        options: &WriteOptions,
-        (whole, rebuilt): (&PartsOutcome, &[String]),
-        resources: &Resources,
-    ) -> Result<(PartsOutcome, FileState), RepairError> {
-        let mut outcome = whole.clone();
-        let scratch = resources.scratch;
-        let lost = match &options.palette {
-            Some(palette) => lost_of_materials(palette, self.format, options, scratch),
-            None => Ok(Vec::new()),
-        };
-        let mut lost = lost.map_err(RepairError::Output)?;
-        if !self.format.has_parts() {
-            lost.push("names of parts".to_owned());
-        }
-        let sink = crate::io::create(self.workspace.part(), self.format, scratch, options);
-        let mut sink = sink.map_err(RepairError::Output)?;
-        let is_split = sink.corner_form() == CornerForm::OfVertices;
-        let mut found = TextsWriter::create(scratch, FOUND)?;
-        let mut there = Numbered::default();
-        let mut nothing = None;
-        for turn in 0..model.places.len() {
-            let (number, at) = model.places.get(turn)?;
-            let name = model.scattered_mut().name(number)?;
-            self.recording.note(&format!("part {} of {}: {name}", turn + 1, model.places.len()));
-            let feed = Feed::Part { of: &model.scattered, number, name: name.clone() };
-            let run = self.run_of(feed, self.settings, model.finest / at.stretch);
-            let workspace = self.open_inner(Inner::Part(number), !rebuilt.is_empty())?;
-            let before = there;
-            let written = self.write_part(&run, &workspace, (&mut sink, &name), &mut there);
-            let mut findings = match written {
-                Ok(findings) => findings,
-                Err(error @ (RepairError::EmptyResult { .. } | RepairError::NoTriangle { .. })) => {
-                    outcome.empty_parts += 1;
-                    outcome.leave_out(number, &name, error.to_string());
-                    nothing.get_or_insert(error);
-                    continue;
-                }
-                Err(error) => return Err(error),
-            };
-            findings.is_split = is_split;
-            findings.lost_maps.clone_from(&lost);
-            let report = PartReport { number, name, places: at.count };
-            let files = workspace.files();
-            let soup = FileState::find(&files, SOUP)?.clone();
-            let resumptions = workspace.resumptions();
-            let done = Done { report, before, after: there, soup, resumptions };
-            found.push(
-                &serde_json::to_string(&(done, findings)).expect("plain records serialise"),
-            )?;
-        }
-        let written = sink.finish().map_err(RepairError::Output)?;
-        if let (0, Some(error)) = (there.triangles, nothing) {
-            return Err(error);
-        }
-        self.recording.count(Counter::OutputBytesWritten, written.file.bytes);
-        outcome.bytes = written.file.bytes;
-        let found = found.finish()?;
-        let concluded =
-            self.prove(model, (&found, &written.file), rebuilt, &mut outcome, resources)?;
-        Ok((outcome, concluded))
-    }
-
-    /// Does what is left of a part up to its surface, and hands that to the sink.
-    fn write_part(
-        &self,
-        run: &Run,
-        workspace: &Workspace,
-        (sink, name): (&mut Sink, &str),
-        there: &mut Numbered,
-    ) -> Result<Findings, RepairError> {
-        let Feed::Part { number, .. } = run.feed else { unreachable!("parts have numbers") };
-        let mut findings = run.earlier_findings(workspace)?;
-        let mut handles = Handles::default();
-        run.steps(workspace, self.pool, &mut findings, &mut handles, Step::Draw)?;
-        let resources = Resources { scratch: workspace.scratch(), ..self.resources() };
-        let looks = match run.has_sources(&findings) {
-            true => {
-                let files = workspace.files();
-                let materials = FileState::find(&files, MATERIALS)?;
-                let looks = FileState::find(&files, LOOK_MATERIALS)?;
-                Palette::new(workspace.scratch(), materials).with_looks(looks).looks()?
-            }
-            false => LookMap::default(),
-        };
-        self.recording.begin(Stage::Contour, findings.contour.triangles);
-        sink.begin_part(number, name).map_err(RepairError::Output)?;
-        let mut part = PartSink::new(&mut **sink, looks, *there);
-        run.write_into(workspace, &mut findings, (&mut handles, None), &mut part, &resources)?;
-        *there = part.after;
-        self.recording.end(Stage::Contour);
-        Ok(findings)
-    }
-
-    /// Reads the file back, and proves each of its parts; the spool of what came of them.
-    fn prove(
-        &self,
-        model: &mut Model,
-        (found, file): (&Spool<u8>, &SinkFile),
-        rebuilt: &[String],
-        outcome: &mut PartsOutcome,
-        resources: &Resources,
-    ) -> Result<FileState, RepairError> {
-        let (part, scratch) = (self.workspace.part().to_path_buf(), resources.scratch.clone());
-        check_output(&part, file, &scratch)?;
-        let share_bytes = resources.share_bytes / 4;
-        let options = match self.format.has_scenes() {
-            true => ReadOptions::by_itself(share_bytes),
-            false => ReadOptions::in_scene(share_bytes),
-        };
-        let open_file =
-            || -> Result<Source, IoError> { crate::io::open(&part, &scratch, &options) };
-        // Each goes through the file once.
-        let (mut proved, mut measured) = (Slices::new(open_file), Slices::new(open_file));
-        let mut concluded = TextsWriter::create(resources.scratch, CONCLUDED)?;
-        let mut texts = Texts::new(found);
-        while let Some(text) = texts.next()? {
-            let (done, mut findings): (Done, Findings) =
-                serde_json::from_str(&text).map_err(|error| {
-                    StoreError::damaged(FOUND.as_ref(), 0, "findings", error.to_string())
-                })?;
-            let Done { report, before, after, soup, resumptions } = done;
-            let (of, number, name) = (&model.scattered, report.number, report.name.clone());
-            let run = self.run_of(Feed::Part { of, number, name }, self.settings, 0.0);
-            let triangles = after.triangles - before.triangles;
-            self.recording.begin(Stage::Verify, 2 * triangles);
-            let mut open =
-                || proved.part(before, after).map(|part| Box::new(part) as ProvedSource<'_, _>);
-            run.prove_source(&mut open, self.workspace, &mut findings, resources)?;
-            self.recording.end(Stage::Verify);
-            if self.settings.deviation {
-                self.recording.begin(Stage::Deviate, triangles);
-                let mut file = measured.part(before, after).map_err(RepairError::ReadBack)?;
-                let scratch = self.workspace.scratch_of(Inner::Part(report.number));
-                let inner = Resources { scratch: &scratch, ..*resources };
-                findings.deviation = run.deviation((&soup, &mut file), &findings, &inner)?;
-                self.recording.end(Stage::Deviate);
-            }
-            findings.written.vertices = after.vertices - before.vertices;
-            findings.written.triangles = triangles;
-            findings.written.file = *file;
-            run.count_scratch(self.workspace);
-            let mut concluded_part = conclude(&run, self.workspace, &findings, rebuilt);
-            concluded_part.resume.resumptions = resumptions;
-            outcome.add(concluded_part.verdict, report.places, triangles);
-            concluded_part.part = Some(report);
-            concluded
-                .push(&serde_json::to_string(&concluded_part).expect("plain records serialise"))?;
-        }
-        if outcome.empty_parts + outcome.hidden_places > 0 {
-            outcome.verdict = outcome.verdict.max(Verdict::Review);
-        }
-        Ok(concluded.finish()?.state().clone())
     }
 }
 

@@ -14,13 +14,13 @@ use crate::io::{SEEN_NODES, SceneTree, SceneWriter};
 use crate::mesh::SceneNode;
 use crate::monitor::Monitor;
 use crate::repair::RepairError;
+use crate::repair::inner::Inner;
 use crate::repair::parts::outcome::PartsOutcome;
 use crate::repair::parts::{Assembly, Model};
 use crate::repair::run::Feed;
 use crate::repair::settings::{Depth, HiddenRule, PartsRule, Settings, ThinRule};
 use crate::repair::stages::Handles;
 use crate::repair::step::Step;
-use crate::repair::workspace::Inner;
 use crate::sign::FillRule;
 use crate::store::{Resources, StoreError};
 
