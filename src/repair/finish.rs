@@ -141,22 +141,9 @@ fn reasons(
 ) -> Vec<String> {
     let domain = findings.domain();
     let mut reasons = Vec::new();
-    if area_ratio < 1.0 - LOST_AREA_SHARE {
-        let lost = (1.0 - area_ratio) * 100.0;
-        reasons.push(format!(
-            "{lost:.0} % of the input's area is not in the output: {} triangles are copies of \
-             others; of {} grid edges that triangles cross, {} belong to walls thinner than a \
-             cell, {} are inside of the solid",
-            findings.settle.duplicate_triangles + findings.settle.interface_triangles,
-            findings.scan.hit_edges,
-            dropped.thin_edges,
-            dropped.buried_edges
-        ));
-    } else if dropped.share_of_surface > LOST_AREA_SHARE {
-        let share = dropped.share_of_surface * 100.0;
-        reasons.push(format!(
-            "{share:.0} % of the grid edges that triangles cross belong to walls thinner than a cell"
-        ));
+    // Where what is seen was measured, that tells what was lost; what nobody sees may go.
+    if findings.deviation.is_none() {
+        reasons.extend(area_reason(findings, dropped, area_ratio));
     }
     let walled = findings.mend.walled_area / findings.measure.area.max(f64::MIN_POSITIVE);
     if walled > WALLED_AREA_SHARE {
@@ -207,6 +194,28 @@ fn reasons(
         }
     }
     reasons
+}
+
+/// Why the areas of input and output make a look worth it, if they do.
+fn area_reason(findings: &Findings, dropped: &Dropped, area_ratio: f64) -> Option<String> {
+    if area_ratio < 1.0 - LOST_AREA_SHARE {
+        let lost = (1.0 - area_ratio) * 100.0;
+        return Some(format!(
+            "{lost:.0} % of the input's area is not in the output: {} triangles are copies of \
+             others; of {} grid edges that triangles cross, {} belong to walls thinner than a \
+             cell, {} are inside of the solid",
+            findings.settle.duplicate_triangles + findings.settle.interface_triangles,
+            findings.scan.hit_edges,
+            dropped.thin_edges,
+            dropped.buried_edges
+        ));
+    }
+    let share = dropped.share_of_surface * 100.0;
+    (dropped.share_of_surface > LOST_AREA_SHARE).then(|| {
+        format!(
+            "{share:.0} % of the grid edges that triangles cross belong to walls thinner than a cell"
+        )
+    })
 }
 
 #[cfg(test)]
