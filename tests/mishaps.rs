@@ -27,8 +27,13 @@ fn worker_of(batch: &mut Child) -> Pid {
     panic!("no worker was started")
 }
 
-/// Whether a process catches SIGTERM.
+/// Whether a process is a worker that catches SIGTERM. Until it became the program of one, it has the
+/// handlers of the batch, and is not bound to that yet.
 fn listens(process: Pid) -> bool {
+    let words = std::fs::read(format!("/proc/{}/cmdline", process.as_raw_pid()));
+    if !words.unwrap_or_default().split(|byte| *byte == 0).any(|word| word == b"worker") {
+        return false;
+    }
     let status = std::fs::read_to_string(format!("/proc/{}/status", process.as_raw_pid()));
     let status = status.unwrap_or_default();
     let mask = status.lines().find_map(|line| line.strip_prefix("SigCgt:"));
