@@ -128,16 +128,25 @@ impl<'m> TreeBuilder<'m> {
         self.sorter.push(Placed { key, level, number: triangle.number, triangle })
     }
 
-    /// Puts boxes around what came.
+    /// Puts boxes around what came. Of copies that follow each other one is kept: a thousand are no
+    /// nearer than one, and each would have to be asked.
     pub(crate) fn finish(self) -> Result<Tree, StoreError> {
         let Self { means, bounds, sorter, .. } = self;
         let mut triangles = Sequence::new(means.scratch, means.share_bytes / 8);
         let mut sorted = sorter.finish()?;
-        while let Some(placed) = sorted.next()? {
+        let mut last: Option<Triangle> = None;
+        while let Some(Placed { triangle, .. }) = sorted.next()? {
+            let is_same = |last: &Triangle| {
+                last.corners == triangle.corners && last.is_pane == triangle.is_pane
+            };
+            if last.as_ref().is_some_and(is_same) {
+                continue;
+            }
             if triangles.len().is_multiple_of(1 << 16) {
                 means.stop_if_asked()?;
             }
-            triangles.push(placed.triangle)?;
+            triangles.push(triangle)?;
+            last = Some(triangle);
         }
         drop(sorted);
         Tree::around(triangles, bounds, means)
