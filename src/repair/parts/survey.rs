@@ -3,7 +3,8 @@
 //! In:         the scene and its parts.
 //! Out:        the scene without the parts of hidden places; how many these are.
 //! Invariant:  a place is hidden if all bodies are (`hidden/`) that its part has there; so a drawer
-//!             whose front is seen stays with all that it has behind.
+//!             whose front is seen stays with all that it has behind. What is small on the grid of
+//!             the survey, which may miss it altogether, stays.
 //! Memory:     that of a run.
 //! Source:     as `hidden/`; on a grid of at most [`SURVEY_DEPTH`] levels, which is enough to see.
 
@@ -26,6 +27,8 @@ use crate::store::{Resources, StoreError};
 
 /// The whole is looked at on a grid no deeper than this.
 const SURVEY_DEPTH: u32 = 8;
+/// Parts smaller than so many cells of that grid are not judged: it may have no hit of them.
+const LEAST_CELLS: f64 = 8.0;
 
 impl Assembly<'_> {
     /// The scene without what nobody sees; `None` where that is all of it.
@@ -59,11 +62,14 @@ impl Assembly<'_> {
         }
         let inner = Resources { scratch: workspace.scratch(), ..*resources };
         let mut seen = run.survey(&workspace, &mut findings, &mut handles, &inner)?;
+        let least = LEAST_CELLS * findings.domain().cell_size();
         let scattered = model.scattered.get_mut().unwrap_or_else(PoisonError::into_inner);
+        let places = &mut model.places;
         let scene = scattered.scene.clone();
         let mut left = SceneWriter::create(resources.scratch, SEEN_NODES)?;
         scene.for_each(|number, mut node| {
             if let Some(part) = node.part
+                && places.size(part, scattered)? >= least
                 && !seen.is_seen(number)?
             {
                 outcome.hidden_places += 1;
@@ -74,6 +80,11 @@ impl Assembly<'_> {
             left.push(&node)
         })?;
         let left = left.finish()?;
+        // Something is seen of every scene.
+        if outcome.hidden_places == places.total() {
+            outcome.hidden_places = 0;
+            outcome.left_out.clear();
+        }
         Ok((outcome.hidden_places > 0).then_some(left))
     }
 }
