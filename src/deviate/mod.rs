@@ -22,6 +22,7 @@ mod deviation;
 mod error;
 mod nearest;
 mod pages;
+mod parts;
 mod quantiles;
 mod reading;
 mod samples;
@@ -34,6 +35,7 @@ mod tree;
 pub use compare::compare;
 pub use deviation::{CreaseReport, Deviation, Distances, LostReport, Normals, Separation};
 pub use error::DeviateError;
+pub use parts::PartsSeen;
 pub use surface::{Surface, SurfaceOptions};
 
 use rayon::ThreadPool;

@@ -7,7 +7,7 @@ use glam::DVec3;
 
 use crate::deviate::{DeviateError, Means};
 use crate::mesh::{MeshSource, TriangleBatch};
-use crate::store::Sequence;
+use crate::store::{Sequence, StoreError};
 
 /// Triangles at one time on their way from a tape.
 pub(crate) const BLOCK: usize = 1024;
@@ -60,6 +60,15 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
     source: &mut S,
     means: &Means<'_>,
 ) -> Result<Tape, DeviateError<S::Error>> {
+    read_with(source, means, |_, _| Ok(()))
+}
+
+/// The same; `note` hears of each triangle with the number of its part.
+pub(crate) fn read_with<S: MeshSource + ?Sized>(
+    source: &mut S,
+    means: &Means<'_>,
+    mut note: impl FnMut(u32, &Triangle) -> Result<(), StoreError>,
+) -> Result<Tape, DeviateError<S::Error>> {
     let failed = |source| DeviateError::Source { source };
     let mut triangles = Sequence::new(means.scratch, means.share_bytes / 8);
     let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
@@ -69,7 +78,8 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
     let mut last = None;
     while source.next_batch(&mut batch).map_err(failed)? {
         means.stop_if_asked()?;
-        for (corners, &material) in batch.corners.iter().zip(&batch.materials) {
+        let marks = batch.materials.iter().zip(&batch.parts);
+        for (corners, (&material, &part)) in batch.corners.iter().zip(marks) {
             if !corners.iter().flatten().all(|x| x.is_finite()) {
                 continue;
             }
@@ -85,6 +95,7 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
             let number = triangles.len() as u32;
             let triangle = Triangle { corners: *corners, number, is_pane: u32::from(is_pane) };
             area += triangle.normal().length() / 2.0;
+            note(part, &triangle)?;
             triangles.push(triangle)?;
         }
         means.monitor.advance(batch.len() as u64);

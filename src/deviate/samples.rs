@@ -129,7 +129,7 @@ fn sample(
 }
 
 /// A point of a triangle; `at` tells those of one triangle apart.
-fn point_within(triangle: &Triangle, at: u64) -> DVec3 {
+pub(crate) fn point_within(triangle: &Triangle, at: u64) -> DVec3 {
     let bits = mix(u64::from(triangle.number) << 32 ^ at);
     // 53 bits make a share.
     let share = |bits: u64| (bits >> 11) as f64 / (1_u64 << 53) as f64;

@@ -17,14 +17,12 @@
 //!             Wilson 1927 are ours to combine.
 
 mod bodies;
-mod parts;
 mod removal;
 mod votes;
 
 use serde::{Deserialize, Serialize};
 
 pub use bodies::Bodies;
-pub use parts::PartsSeen;
 pub use removal::{SEEN, Seen, leave_out};
 pub use votes::{Verdict, Verdicts, judge};
 

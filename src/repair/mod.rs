@@ -13,7 +13,6 @@ mod depth;
 mod error;
 mod estimate;
 mod finish;
-mod inner;
 mod inspect;
 mod inspection;
 mod length;

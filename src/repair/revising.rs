@@ -6,7 +6,7 @@ use std::collections::BTreeSet;
 
 use crate::bridge::{Mended, SLAB_ORIGINS, ThickenStats, Thickened, thicken};
 use crate::contour::{Method, SurfaceDetail};
-use crate::hidden::{Bodies, HiddenStats, PartsSeen, Seen, Verdicts, judge, leave_out};
+use crate::hidden::{Bodies, HiddenStats, Seen, judge, leave_out};
 use crate::ingest::{Bins, names_of_parts};
 use crate::monitor::Monitor;
 use crate::octree::{BinnedSoup, Flips};
@@ -14,10 +14,9 @@ use crate::patch::patch;
 use crate::repair::RepairError;
 use crate::repair::deeper::{DepthTrial, goes_deeper};
 use crate::repair::depth::choose_domain;
-use crate::repair::run::{Run, to_text};
+use crate::repair::run::Run;
 use crate::repair::settings::{Depth, HiddenRule, ThinRule};
 use crate::repair::stages::{Findings, Handles, hand_on, open_bricks};
-use crate::repair::step::Step;
 use crate::repair::workspace::Workspace;
 use crate::scan::{HAS_ODD_FACES, HITS, scan};
 use crate::sign::{Exposed, FillRule, Flooded, find_exposed, find_lost, flood};
@@ -151,8 +150,13 @@ impl Run<'_> {
         }
         let domain = *findings.domain();
         let given = findings.soup().stats.triangles;
-        let (mut bodies, mut verdicts, mut stats) =
-            judge_bodies(soup, hits, scanned, findings, resources)?;
+        let added = findings.mend.added_triangles + findings.thickened.added_triangles;
+        let mut bodies = Bodies::join(soup, given + added, &domain, resources)?;
+        let Scanned { flips, flooded, .. } = scanned;
+        let Exposed { places, touched, occupancy } =
+            find_exposed(hits, flips, flooded, &domain, |source| bodies.of(source), resources)
+                .map_err(RepairError::Sign)?;
+        let (mut verdicts, mut stats) = judge(places, touched, occupancy, &bodies, resources)?;
         let judged = (&mut bodies, &mut verdicts);
         let seen = leave_out(soup, given, judged, &domain, &mut stats, resources)?;
         let numbers: BTreeSet<u32> = stats.largest.iter().map(|body| body.part_number).collect();
@@ -166,36 +170,6 @@ impl Run<'_> {
         }
         findings.hidden = stats;
         Ok(seen)
-    }
-
-    /// Which parts are in sight, of a model that was flooded; instead of revising it.
-    pub(crate) fn survey(
-        &self,
-        workspace: &Workspace,
-        findings: &mut Findings,
-        handles: &mut Handles,
-        resources: &Resources,
-    ) -> Result<PartsSeen, RepairError> {
-        let files = workspace.files();
-        let (flips, flooded) = (Flips::open(resources, &files)?, Flooded::open(resources, &files)?);
-        let mut scanned = Scanned { flips, flooded, files: Vec::new() };
-        let bins = Bins::open(resources, &files, findings.left_out)?;
-        let mended = Mended::open(resources, &files)?;
-        let mut soup = mended.soup(bins.spools());
-        let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
-        let thickened = self.thicken(&soup, hits, &scanned, findings, resources)?;
-        if let Some(thickened) = &thickened {
-            // No step answers for what is written from here on: a later run begins before it.
-            workspace.go_back_to(Step::Scan, to_text(findings))?;
-            soup = thickened.soup(&soup);
-            scanned = self.scan_again(&soup, findings, handles, resources)?;
-        }
-        let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
-        let (mut bodies, mut verdicts, _) =
-            judge_bodies(&soup, hits, &scanned, findings, resources)?;
-        let given = findings.soup().stats.triangles;
-        let judged = (&mut bodies, &mut verdicts);
-        Ok(PartsSeen::find(&soup, given, judged, findings.domain(), resources)?)
     }
 
     /// Scans, patches and floods a soup that was changed. As a whole: what is noted on the way
@@ -253,24 +227,4 @@ impl Run<'_> {
         }
         Ok(true)
     }
-}
-
-/// Joins bodies, and judges who sees them.
-fn judge_bodies(
-    soup: &BinnedSoup,
-    hits: &BrickFile,
-    scanned: &Scanned,
-    findings: &Findings,
-    resources: &Resources,
-) -> Result<(Bodies, Verdicts, HiddenStats), RepairError> {
-    let domain = *findings.domain();
-    let given = findings.soup().stats.triangles;
-    let added = findings.mend.added_triangles + findings.thickened.added_triangles;
-    let mut bodies = Bodies::join(soup, given + added, &domain, resources)?;
-    let Scanned { flips, flooded, .. } = scanned;
-    let Exposed { places, touched, occupancy } =
-        find_exposed(hits, flips, flooded, &domain, |source| bodies.of(source), resources)
-            .map_err(RepairError::Sign)?;
-    let (verdicts, stats) = judge(places, touched, occupancy, &bodies, resources)?;
-    Ok((bodies, verdicts, stats))
 }

@@ -234,11 +234,6 @@ impl InputIdentity {
 pub enum Feed<'r> {
     /// The input file.
     File,
-    /// All parts of it in their places.
-    Placed {
-        /// The parts.
-        of: &'r Mutex<Scattered>,
-    },
     /// A part of it.
     Part {
         /// All of them.
@@ -465,6 +460,6 @@ impl Run<'_> {
 }
 
 /// Findings as the manifest holds them.
-pub(crate) fn to_text(findings: &Findings) -> String {
+fn to_text(findings: &Findings) -> String {
     serde_json::to_string(findings).expect("plain records serialise")
 }

@@ -222,11 +222,6 @@ impl Run<'_> {
                 check_converted(self.input, to_unit, soup.facts.unit)?;
                 soup
             }
-            Feed::Placed { of } => {
-                let mut parts = of.lock().unwrap_or_else(PoisonError::into_inner);
-                let mut source = parts.placed(resources)?;
-                self.read_from(&mut source, resources)?
-            }
             Feed::Part { of, number, name } => {
                 let mut parts = of.lock().unwrap_or_else(PoisonError::into_inner);
                 let mut source = parts.part(*number, name)?;

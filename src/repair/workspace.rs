@@ -17,7 +17,6 @@ use crate::io::{ASIDE, IoError, check_output};
 use crate::mesh::SinkFile;
 use crate::monitor::Monitor;
 use crate::repair::RepairError;
-use crate::repair::inner::Inner;
 use crate::repair::lock::{LOCK, lock_folder};
 use crate::repair::settings::Limits;
 use crate::repair::standing::{
@@ -29,6 +28,8 @@ use crate::store::{
     load_manifest, save_manifest, sync_folder,
 };
 
+/// What names of the folders of parts begin with.
+const PART_FOLDER: &str = "part-";
 /// Ending of work folders.
 const ENDING: &str = "brickmend";
 
@@ -84,18 +85,18 @@ impl Workspace {
         Self::begin((folder, lock), outputs, part, scratch, (limits, key))
     }
 
-    /// The work folder of a part of the model, or the one in which it is looked at as a whole,
-    /// inside of this one. Its disk counts with that of this one.
+    /// The work folder of a part of the model, inside of this one. Its disk counts with that of this
+    /// one.
     ///
     /// # Errors
     /// As [`Workspace::open`].
-    pub fn open_inner(
+    pub fn open_part(
         &self,
-        inner: Inner,
+        number: u32,
         limits: &Limits,
         key: [u8; 32],
     ) -> Result<Self, RepairError> {
-        let folder = self.folder.join(inner.name());
+        let folder = self.folder.join(part_folder(number));
         let lock = lock_folder(&folder)?;
         let (part, scratch) = (folder.join(OUTPUT_PART), self.scratch.beside(&folder));
         Self::begin((folder, lock), self.outputs.clone(), part, scratch, (limits, key))
@@ -122,30 +123,36 @@ impl Workspace {
         Ok(workspace)
     }
 
-    /// The scratch of a folder inside of this one.
+    /// The scratch of a part.
     #[must_use]
-    pub fn scratch_of(&self, inner: Inner) -> Scratch {
-        self.scratch.beside(&self.folder.join(inner.name()))
+    pub fn scratch_of(&self, number: u32) -> Scratch {
+        self.scratch.beside(&self.folder.join(part_folder(number)))
     }
 
-    /// The folders of ours in this one.
-    fn inner_folders(&self) -> Result<Vec<(Inner, PathBuf)>, StoreError> {
+    /// The part whose work folder has the file at `path`.
+    #[must_use]
+    pub fn part_with(&self, path: &Path) -> Option<u32> {
+        let folder = path.parent().filter(|folder| folder.parent() == Some(&self.folder))?;
+        part_number(folder)
+    }
+
+    /// The folders of parts in this one, with their numbers.
+    fn part_folders(&self) -> Result<Vec<(u32, PathBuf)>, StoreError> {
         let failed = |e| StoreError::io("list", &self.folder, e);
         let mut found = Vec::new();
         for entry in std::fs::read_dir(&self.folder).map_err(failed)? {
             let path = entry.map_err(failed)?.path();
-            let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-            if let Some(inner) = Inner::named(name).filter(|_| path.is_dir()) {
-                found.push((inner, path));
+            if let Some(number) = part_number(&path).filter(|_| path.is_dir()) {
+                found.push((number, path));
             }
         }
         Ok(found)
     }
 
-    /// Removes those folders of ours in this one that are no longer wanted.
-    fn remove_inner(&self, is_wanted: impl Fn(Inner) -> bool) -> Result<(), StoreError> {
-        for (inner, folder) in self.inner_folders()? {
-            if !is_wanted(inner) {
+    /// Removes what is ours in the folders of parts, from a number on.
+    fn remove_parts(&self, first: u32) -> Result<(), StoreError> {
+        for (number, folder) in self.part_folders()? {
+            if number >= first {
                 for name in all_names() {
                     self.scratch.remove_at(&folder.join(name))?;
                     self.scratch.remove_at(&folder.join(directory_name(name)))?;
@@ -162,7 +169,7 @@ impl Workspace {
     /// # Errors
     /// The folder cannot be read or written.
     pub fn keep_parts(&self, count: u32) -> Result<(), StoreError> {
-        self.remove_inner(|inner| inner == Inner::Whole || inner.is_below(count))
+        self.remove_parts(count)
     }
 
     /// Takes over what an earlier run left, as far as it is of use.
@@ -422,7 +429,7 @@ impl Workspace {
     /// Removes the folder and all that is ours in it.
     pub fn remove(self) {
         // A leftover folder is ugly, not wrong: the next run sweeps it.
-        let _ = self.remove_inner(|_| false);
+        let _ = self.remove_parts(0);
         for name in all_names() {
             let _ = self.remove_file(name);
         }
@@ -465,6 +472,15 @@ fn is_nameless(path: &Path) -> bool {
     let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
     let mut words = name.rsplit('.');
     words.next() == Some("tmp") && words.next().is_some_and(|number| number.parse::<u64>().is_ok())
+}
+
+fn part_folder(number: u32) -> String {
+    format!("{PART_FOLDER}{number}")
+}
+
+/// The number of the part that a folder has the name of.
+fn part_number(folder: &Path) -> Option<u32> {
+    folder.file_name()?.to_str()?.strip_prefix(PART_FOLDER)?.parse().ok()
 }
 
 fn parent_of(path: &Path) -> &Path {

@@ -8,7 +8,6 @@ use crate::io::{LookMap, MATERIALS, Palette, Sink, WriteOptions, lost_of_materia
 use crate::mesh::CornerForm;
 use crate::monitor::{Counter, Monitor, Stage};
 use crate::repair::RepairError;
-use crate::repair::inner::Inner;
 use crate::repair::parts::outcome::{PartReport, PartsOutcome};
 use crate::repair::parts::part_sink::{Numbered, PartSink};
 use crate::repair::parts::{Assembly, Done, Model};
@@ -50,8 +49,8 @@ impl Assembly<'_> {
             let name = model.scattered_mut().name(number)?;
             self.recording.note(&format!("part {} of {}: {name}", turn + 1, model.places.len()));
             let feed = Feed::Part { of: &model.scattered, number, name: name.clone() };
-            let run = self.run_of(feed, self.settings, model.finest / at.stretch);
-            let workspace = self.open_inner(Inner::Part(number), !rebuilt.is_empty())?;
+            let run = self.run_of(feed, model.finest / at.stretch);
+            let workspace = self.open_part(number, !rebuilt.is_empty())?;
             let before = there;
             let written = self.write_part(&run, &workspace, (&mut sink, &name), &mut there);
             let mut findings = match written {

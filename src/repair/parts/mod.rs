@@ -36,7 +36,6 @@ use crate::io::{Format, Palette, ReadOptions, WriteOptions, library_name};
 use crate::monitor::{Monitor, Recording, Stage};
 use crate::repair::RepairError;
 use crate::repair::depth::choose_domain;
-use crate::repair::inner::Inner;
 use crate::repair::length::Ruler;
 use crate::repair::levels::Level;
 use crate::repair::outcome::Outcome;
@@ -131,8 +130,6 @@ struct Assembly<'a> {
 struct Model {
     scattered: Mutex<Scattered>,
     places: Places,
-    /// The depth that the whole would have.
-    depth: u32,
     /// Cells are no smaller, in the scene.
     finest: f64,
 }
@@ -235,13 +232,13 @@ impl Assembly<'_> {
         let ruler = Ruler { bounds: places.bounds, unit };
         let Settings { depth, sheet_thickness, .. } = self.settings;
         let whole = choose_domain(self.input, &ruler, depth, sheet_thickness, self.format, 0.0);
-        let (depth, finest) = match whole {
-            Ok(domain) => (domain.depth, domain.cell_size() / FINER_THAN_WHOLE),
+        let finest = match whole {
+            Ok(domain) => domain.cell_size() / FINER_THAN_WHOLE,
             // Each part has a place of its own, where numbers may be finer.
-            Err(RepairError::OutputTooCoarse { possible_depth, .. }) => (possible_depth, 0.0),
+            Err(RepairError::OutputTooCoarse { .. }) => 0.0,
             Err(error) => return Err(error),
         };
-        Ok(Model { scattered: Mutex::new(scattered), places, depth, finest })
+        Ok(Model { scattered: Mutex::new(scattered), places, finest })
     }
 
     /// How the whole is written.
@@ -263,15 +260,15 @@ impl Assembly<'_> {
         }
     }
 
-    /// The run of a part, or of all of them.
-    fn run_of<'m>(&'m self, feed: Feed<'m>, settings: Settings, finest: f64) -> Run<'m> {
+    /// The run of a part.
+    fn run_of<'m>(&'m self, feed: Feed<'m>, finest: f64) -> Run<'m> {
         let output = self.output.to_path_buf();
         Run {
             input: self.input,
             feed,
             finest,
             format: self.format,
-            settings,
+            settings: self.settings,
             levels: vec![Level { decimate: self.settings.decimate, output }],
             limits: self.limits,
             plan: self.plan,
@@ -281,20 +278,15 @@ impl Assembly<'_> {
         }
     }
 
-    fn open_inner(&self, inner: Inner, is_again: bool) -> Result<Workspace, RepairError> {
+    fn open_part(&self, number: u32, is_again: bool) -> Result<Workspace, RepairError> {
         let limits = Limits { fresh: self.limits.fresh && !is_again, ..self.limits.clone() };
-        let key = match inner {
-            Inner::Part(number) => part_key(self.key, number),
-            Inner::Whole => self.key,
-        };
-        self.workspace.open_inner(inner, &limits, key)
+        self.workspace.open_part(number, &limits, part_key(self.key, number))
     }
 
     /// Sends the part whose work folder has `path` back to where that is made.
     fn go_back_for(&self, path: &Path) -> Result<(), RepairError> {
-        let folder = path.parent().and_then(Path::file_name).and_then(|name| name.to_str());
-        if let Some(inner) = folder.and_then(Inner::named) {
-            self.open_inner(inner, true)?.go_back_for(path)?;
+        if let Some(number) = self.workspace.part_with(path) {
+            self.open_part(number, true)?.go_back_for(path)?;
         }
         Ok(())
     }

@@ -78,16 +78,6 @@ impl Places {
         self.total
     }
 
-    /// The diagonal of a part's box where it stands longest.
-    ///
-    /// # Errors
-    /// The scratch disk fails.
-    pub fn size(&mut self, part: u32, scattered: &mut Scattered) -> Result<f64, StoreError> {
-        let SnapBox { lo, hi } = scattered.bounds(part)?;
-        let diagonal = [0, 1, 2].map(|axis| (hi[axis] - lo[axis]).powi(2)).iter().sum::<f64>();
-        Ok(diagonal.sqrt() * self.parts.get(part.into())?.stretch)
-    }
-
     /// How many parts stand anywhere.
     pub fn len(&self) -> u32 {
         self.order.len() as u32

@@ -7,7 +7,6 @@ use crate::mesh::SinkFile;
 use crate::monitor::{Monitor, Stage};
 use crate::repair::RepairError;
 use crate::repair::finish::conclude;
-use crate::repair::inner::Inner;
 use crate::repair::outcome::Verdict;
 use crate::repair::parts::outcome::PartsOutcome;
 use crate::repair::parts::slices::Slices;
@@ -48,7 +47,7 @@ impl Assembly<'_> {
                 })?;
             let Done { report, before, after, soup, resumptions } = done;
             let (of, number, name) = (&model.scattered, report.number, report.name.clone());
-            let run = self.run_of(Feed::Part { of, number, name }, self.settings, 0.0);
+            let run = self.run_of(Feed::Part { of, number, name }, 0.0);
             let triangles = after.triangles - before.triangles;
             self.recording.begin(Stage::Verify, 2 * triangles);
             let mut open =
@@ -58,7 +57,7 @@ impl Assembly<'_> {
             if self.settings.deviation {
                 self.recording.begin(Stage::Deviate, triangles);
                 let mut file = measured.part(before, after).map_err(RepairError::ReadBack)?;
-                let scratch = self.workspace.scratch_of(Inner::Part(report.number));
+                let scratch = self.workspace.scratch_of(report.number);
                 let inner = Resources { scratch: &scratch, ..*resources };
                 findings.deviation = run.deviation((&soup, &mut file), &findings, &inner)?;
                 self.recording.end(Stage::Deviate);

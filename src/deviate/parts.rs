@@ -1,0 +1,145 @@
+//! Which parts of a scene can be seen from outside of all of it.
+//!
+//! In:         all triangles, those of a part one after another.
+//! Out:        [`PartsSeen`].
+//! Invariant:  a part is seen if some of [`SAMPLES_OF_PART`] points spread over its area is, as
+//!             [`crate::deviate::sight`] has it: so what is seen through an opening or behind a pane
+//!             stays, and no grid decides what is small. One without an area is seen.
+//! Memory:     half of the share; 24 bytes a part, in a table that spills.
+
+use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
+
+use crate::deviate::nearest::Walker;
+use crate::deviate::reading::{BLOCK, Tape, Triangle, read_with};
+use crate::deviate::samples::{Spread, point_within};
+use crate::deviate::sight::Sight;
+use crate::deviate::tree::{Curve, Tree, TreeBuilder};
+use crate::deviate::{DeviateError, Means};
+use crate::mesh::MeshSource;
+use crate::store::{Sequence, StoreError, Table, ordered};
+
+/// Points that are looked at of a part, until one is seen.
+const SAMPLES_OF_PART: u64 = 64;
+
+/// Triangles of a part, and their area.
+#[derive(Clone, Copy, Pod, Zeroable)]
+#[repr(C)]
+struct Extent {
+    first: u64,
+    triangles: u64,
+    area: f64,
+}
+
+/// By part whether somebody sees it.
+pub struct PartsSeen {
+    hidden: Table<u8>,
+}
+
+impl PartsSeen {
+    /// Reads `source` to its end, and looks at every part of it.
+    ///
+    /// # Errors
+    /// [`DeviateError`]: the source fails, the scratch disk fails, or the caller cancels.
+    pub fn find<S: MeshSource + ?Sized>(
+        source: &mut S,
+        means: &Means<'_>,
+    ) -> Result<Self, DeviateError<S::Error>> {
+        let mut extents = Table::<Extent>::new(means.scratch, means.share_bytes / 32);
+        let tape = read_with(source, means, |part, triangle| {
+            let part = u64::from(part);
+            while extents.len() <= part {
+                extents.push(Extent { first: u64::from(triangle.number), ..Extent::zeroed() })?;
+            }
+            let known = extents.get(part)?;
+            let area = known.area + triangle.normal().length() / 2.0;
+            extents.set(part, Extent { triangles: known.triangles + 1, area, ..known })
+        })?;
+        let mut hidden = Table::new(means.scratch, means.share_bytes / 32);
+        if tape.is_measurable() {
+            look(&tape, extents, &mut hidden, means)?;
+        }
+        Ok(Self { hidden })
+    }
+
+    /// Whether a part is in sight.
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn is_seen(&mut self, part: u32) -> Result<bool, StoreError> {
+        let part = u64::from(part);
+        Ok(part >= self.hidden.len() || self.hidden.get(part)? == 0)
+    }
+}
+
+/// Looks at all parts, in order.
+fn look(
+    tape: &Tape,
+    mut extents: Table<Extent>,
+    hidden: &mut Table<u8>,
+    means: &Means<'_>,
+) -> Result<(), StoreError> {
+    let mut builder = TreeBuilder::new(tape.bounds, means);
+    tape.triangles.each_block(BLOCK, |block| {
+        means.stop_if_asked()?;
+        block.iter().try_for_each(|triangle| builder.add(*triangle))
+    })?;
+    let tree = builder.finish()?;
+    let mut part = 0;
+    ordered(
+        means.pool,
+        || {
+            means.stop_if_asked()?;
+            if part == extents.len() {
+                return Ok(None);
+            }
+            part += 1;
+            extents.get(part - 1).map(Some)
+        },
+        || Looker::new(&tree, tape, means),
+        |looker, extent| looker.is_hidden(extent),
+        |is_hidden| hidden.push(u8::from(is_hidden)),
+    )
+}
+
+/// Looks at parts; each worker has its own.
+struct Looker<'t> {
+    triangles: &'t Sequence<Triangle>,
+    sight: Sight<'t>,
+    room: Vec<Triangle>,
+}
+
+impl<'t> Looker<'t> {
+    fn new(tree: &'t Tree, tape: &'t Tape, means: &Means<'_>) -> Self {
+        let share_bytes = means.share_bytes / 8 / means.pool.current_num_threads() as u64;
+        let extent = Curve::new(tape.bounds).extent;
+        let sight = Sight::new(Walker::new(tree, share_bytes), extent);
+        Self { triangles: &tape.triangles, sight, room: Vec::new() }
+    }
+
+    fn is_hidden(&mut self, extent: Extent) -> Result<bool, StoreError> {
+        if !extent.area.is_normal() {
+            return Ok(false);
+        }
+        let mut spread = Spread::new(SAMPLES_OF_PART, extent.area);
+        let mut at = extent.first;
+        let end = extent.first + extent.triangles;
+        while at < end {
+            let count = (end - at).min(BLOCK as u64) as usize;
+            let block = self.triangles.block(at, count, &mut self.room)?;
+            at += block.len() as u64;
+            for triangle in block {
+                let normal = triangle.normal();
+                let numbers = spread.take(normal.length() / 2.0);
+                let normal = normal.normalize_or_zero();
+                for (number, _) in (0..).zip(numbers) {
+                    let point = point_within(triangle, number);
+                    if self.sight.sees(point, normal, DVec3::ZERO)? {
+                        return Ok(false);
+                    }
+                }
+            }
+        }
+        Ok(true)
+    }
+}
