@@ -254,6 +254,21 @@ fn the_documentation_names_every_field_of_the_whole() {
 }
 
 #[test]
+fn a_part_beyond_all_numbers_is_left_out_and_told() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let input = folder.path().join("vast.obj");
+    let text =
+        format!("o near\n{}o far\n{}", cube([0.0; 3], 1.0, 0, 6), cube([0.0; 3], 1e120, 8, 6));
+    std::fs::write(&input, text).expect("written");
+    let output = folder.path().join("out.obj");
+    let (whole, outcomes) =
+        separate(&input, &output, &settings(5), &Limits::default()).expect("the other is there");
+    assert_eq!((whole.parts, whole.empty_parts, whole.hidden_places), (1, 1, 0));
+    assert_eq!((whole.left_out[0].name.as_str(), whole.verdict), ("far", Verdict::Review));
+    assert!((outcomes[0].output.proof.volume - 8.0).abs() < 1e-6);
+}
+
+#[test]
 fn what_is_for_one_solid_is_refused() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let input = scene(folder.path());

@@ -131,13 +131,8 @@ fn run_parts(
         Ok(whole) => whole,
         Err(error) => return fail(&error, stop, chatter),
     };
-    let mut exit = if whole.verdict == Verdict::Fail { Exit::NoResult } else { Exit::Success };
-    if let Some(path) = &arguments.preview
-        && let Err(error) = draw(arguments, path)
-    {
-        chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));
-        exit = Exit::Unusable;
-    }
+    let exit = if whole.verdict == Verdict::Fail { Exit::NoResult } else { Exit::Success };
+    let exit = draw_preview(arguments, chatter).unwrap_or(exit);
     whole.stages = progress.stages();
     whole.peak_bytes = peak_resident_bytes();
     if arguments.json {
@@ -214,13 +209,8 @@ fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
 /// Tells the outcomes, draws the preview.
 fn finish(arguments: &RepairArguments, outcomes: &mut [Outcome], chatter: &Chatter) -> ExitCode {
     let sound = outcomes.iter().all(|outcome| outcome.verdict != Verdict::Fail);
-    let mut exit = if sound { Exit::Success } else { Exit::NoResult };
-    if let Some(path) = &arguments.preview
-        && let Err(error) = draw(arguments, path)
-    {
-        chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));
-        exit = Exit::Unusable;
-    }
+    let exit = if sound { Exit::Success } else { Exit::NoResult };
+    let mut exit = draw_preview(arguments, chatter).unwrap_or(exit);
     for outcome in outcomes.iter_mut() {
         outcome.memory.peak_bytes = peak_resident_bytes();
     }
@@ -267,6 +257,14 @@ fn summary(outcome: &Outcome) -> String {
         }
     }
     text
+}
+
+/// Draws the preview, if one is wanted; how the process ends where that fails.
+fn draw_preview(arguments: &RepairArguments, chatter: &Chatter) -> Option<Exit> {
+    let path = arguments.preview.as_ref()?;
+    let error = draw(arguments, path).err()?;
+    chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));
+    Some(Exit::Unusable)
 }
 
 /// Draws input beside output; a sixth of the memory budget is for the bands.

@@ -6,6 +6,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::{DeviateError, Means};
+use crate::geom::mix;
 use crate::mesh::{MeshSource, TriangleBatch};
 use crate::store::{Sequence, StoreError};
 
@@ -36,6 +37,11 @@ impl Triangle {
         let [a, b, c] = self.points();
         (b - a).cross(c - a)
     }
+}
+
+/// A hash of numbers, the same for both zeros.
+pub(crate) fn hash_of<'n>(numbers: impl IntoIterator<Item = &'n f64>) -> u64 {
+    numbers.into_iter().fold(0, |bits, x| mix(bits ^ (x + 0.0).to_bits()))
 }
 
 /// A surface that was read.

@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::Means;
-use crate::deviate::reading::{BLOCK, Tape, Triangle};
+use crate::deviate::reading::{BLOCK, Tape, Triangle, hash_of};
 use crate::deviate::tree::Curve;
 use crate::geom::mix;
 use crate::store::{Record, Sequence, Sorter, StoreError};
@@ -114,7 +114,7 @@ fn sample(
     corner: u64,
 ) -> Sample {
     let place = match corner {
-        1 => point.to_array().into_iter().fold(0, |bits, x| mix(bits ^ (x + 0.0).to_bits())),
+        1 => hash_of(&point.to_array()),
         _ => 0,
     };
     Sample {

@@ -13,7 +13,7 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::Means;
-use crate::deviate::reading::{BLOCK, Triangle};
+use crate::deviate::reading::{BLOCK, Triangle, hash_of};
 use crate::geom::morton;
 use crate::store::{Record, Sequence, Sorter, StoreError};
 
@@ -90,15 +90,17 @@ impl Curve {
 #[repr(C)]
 struct Placed {
     key: u64,
+    /// Of its corners, so that copies follow each other.
+    hash: u64,
     level: u32,
     number: u32,
     triangle: Triangle,
 }
 
 impl Record for Placed {
-    type Key = (u32, u64, u32);
+    type Key = (u32, u64, u64, u32);
     fn key(&self) -> Self::Key {
-        (self.level, self.key, self.number)
+        (self.level, self.key, self.hash, self.number)
     }
 }
 
@@ -125,11 +127,12 @@ impl<'m> TreeBuilder<'m> {
             .find(|&level| size * f64::from(2_u32 << level) > self.curve.extent)
             .unwrap_or(SIZE_LEVELS);
         let key = self.curve.key(low.midpoint(high));
-        self.sorter.push(Placed { key, level, number: triangle.number, triangle })
+        let hash = hash_of(triangle.corners.as_flattened());
+        self.sorter.push(Placed { key, hash, level, number: triangle.number, triangle })
     }
 
-    /// Puts boxes around what came. Of copies that follow each other one is kept: a thousand are no
-    /// nearer than one, and each would have to be asked.
+    /// Puts boxes around what came. Of copies one is kept: a thousand are no nearer than one, and each
+    /// would have to be asked.
     pub(crate) fn finish(self) -> Result<Tree, StoreError> {
         let Self { means, bounds, sorter, .. } = self;
         let mut triangles = Sequence::new(means.scratch, means.share_bytes / 8);
@@ -227,5 +230,32 @@ impl Boxes<'_> {
         }
         self.levels.truncate(level + 1);
         Ok(self.levels)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::monitor::Void;
+    use crate::store::Scratch;
+
+    #[test]
+    fn of_copies_one_is_kept_though_others_share_their_box() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(1).build().expect("a thread");
+        let means = Means { scratch: &scratch, pool: &pool, share_bytes: 1 << 20, monitor: &Void };
+        let mut builder = TreeBuilder::new([[0.0; 3], [1.0, 1.0, 0.0]], &means);
+        let halves = [
+            [[0.0; 3], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0]],
+            [[0.0; 3], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]],
+        ];
+        for number in 0..2000 {
+            let corners = halves[number as usize % 2];
+            builder.add(Triangle { corners, number, is_pane: 0 }).expect("added");
+        }
+        // Light passes this one, and not the others in its place.
+        builder.add(Triangle { corners: halves[0], number: 2000, is_pane: 1 }).expect("added");
+        assert_eq!(builder.finish().expect("a tree").triangles.len(), 3);
     }
 }

@@ -77,7 +77,7 @@ pub fn scatter<S: MeshSource + ?Sized>(
         scene,
         unit: source.unit(),
         stats,
-        materials: Materials { texts: open(&palette[0])? },
+        materials: Materials::new(open(&palette[0])?),
         palette,
         has: Has {
             uvs: has_uvs,

@@ -76,18 +76,35 @@ pub(super) struct Has {
     pub(super) materials: bool,
 }
 
+/// Triangles may change their material each time, so some are held as read.
+const HELD_MATERIALS: usize = 64;
+
 /// The materials of the file, by number.
 pub(super) struct Materials {
+    /// Those asked for last, each at its number modulo their count.
+    pub(super) held: Vec<Option<(u32, Material)>>,
     pub(super) texts: NumberedTexts,
 }
 
 impl Materials {
+    pub(super) fn new(texts: NumberedTexts) -> Self {
+        Self { held: vec![None; HELD_MATERIALS], texts }
+    }
+
     fn get(&mut self, number: u32) -> Result<Material, StoreError> {
+        let slot = number as usize % HELD_MATERIALS;
+        if let Some((held, material)) = &self.held[slot]
+            && *held == number
+        {
+            return Ok(material.clone());
+        }
         let text = self.texts.get(number.into())?;
-        serde_json::from_str(&text).map_err(|error| {
+        let material: Material = serde_json::from_str(&text).map_err(|error| {
             let found = format!("{text}: {error}");
             StoreError::damaged(MATERIALS.as_ref(), number.into(), "a material", found)
-        })
+        })?;
+        self.held[slot] = Some((number, material.clone()));
+        Ok(material)
     }
 }
 

@@ -70,9 +70,8 @@ impl Assembly<'_> {
             let soup = FileState::find(&files, SOUP)?.clone();
             let resumptions = workspace.resumptions();
             let done = Done { report, before, after: there, soup, resumptions };
-            found.push(
-                &serde_json::to_string(&(done, findings)).expect("plain records serialise"),
-            )?;
+            let text = serde_json::to_string(&(&done, &findings)).expect("plain records serialise");
+            found.push(&text)?;
         }
         let written = sink.finish().map_err(RepairError::Output)?;
         if let (0, Some(error)) = (there.triangles, nothing) {
