@@ -25,6 +25,7 @@ mod contacts;
 mod cracks;
 pub mod fill;
 mod loops;
+mod losses;
 mod miters;
 mod openings;
 pub mod pair;

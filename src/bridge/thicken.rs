@@ -13,19 +13,17 @@
 //! Fails:      [`StoreError`].
 //! Source:     ours.
 
-use std::collections::BTreeMap;
-
 use glam::DVec3;
 
+use crate::bridge::losses::Losses;
 use crate::bridge::sheets::{MOST_TRIANGLES, Sheets};
 use crate::bridge::walls::Slab;
 use crate::bridge::{Added, Like, MendOptions};
-use crate::octree::points::is_owned;
 use crate::octree::{
     BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, Panes, SoupEdges, SoupTriangle,
     write_bins,
 };
-use crate::store::{Resources, Sorted, Sorter, Spool, StoreError, Table};
+use crate::store::{Resources, Sorter, Spool, StoreError};
 
 /// Spools of the triangles that are added in the end, and of their bins; they live within a step.
 pub const THICKENED: [&str; 2] = ["thickened.spool", "thickened.entries"];
@@ -33,18 +31,6 @@ pub const THICKENED: [&str; 2] = ["thickened.spool", "thickened.entries"];
 /// Spool of the triangles that slabs come from, as [`crate::bridge::ORIGINS`] for what was added
 /// before.
 pub const SLAB_ORIGINS: &str = "slabs.origins";
-
-/// Share of its hits that a wall loses when it is thin: of a plate that is t cells thick 1 - t.
-const LOST_SHARE: f64 = 0.15;
-
-/// Share of its hits that a large triangle of a torn piece has to lose to be taken for a part of it.
-const BRINK_SHARE: f64 = 0.03;
-
-/// Fewer lost hits than this are those of a tip or an edge.
-const LEAST_LOST: f64 = 4.0;
-
-/// A triangle that should have fewer hits tells nothing by itself.
-const LEAST_HITS: f64 = 8.0;
 
 /// What was thickened.
 #[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -78,32 +64,6 @@ impl Thickened {
     }
 }
 
-/// Hits of a triangle, or of a sheet's triangles in one brick.
-#[derive(Clone, Copy, Debug, Default)]
-struct Hits {
-    expected: f64,
-    lost: f64,
-}
-
-impl Hits {
-    fn add(&mut self, other: Self) {
-        self.expected += other.expected;
-        self.lost += other.lost;
-    }
-
-    /// Whether a triangle of this piece is torn. A large one tells for itself, unless it is on the
-    /// brink.
-    fn tears(self, alone: Self) -> bool {
-        let is_large = alone.expected >= LEAST_HITS;
-        let takes_part = !is_large || alone.lost >= BRINK_SHARE * alone.expected;
-        is_large && alone.are_torn() || takes_part && self.are_torn()
-    }
-
-    fn are_torn(self) -> bool {
-        self.lost >= LEAST_LOST && self.lost >= LOST_SHARE * self.expected
-    }
-}
-
 /// Thickens what loses hits; `given` is the number of source numbers of the input, `first` the
 /// first one that is free. `None` where there is nothing to thicken.
 ///
@@ -121,42 +81,32 @@ pub fn thicken(
         resources.monitor.note("too many triangles to thicken those that are thin");
         return Ok(None);
     }
+    let mut losses = Losses::new(lost, domain, (given, first), resources)?;
+    if !losses.may_tear(soup, resources)? {
+        return Ok(None);
+    }
     let pairs = SoupEdges::find(soup, domain, Panes::Apart, resources)?.pairs;
     let mut sheets = Sheets::join(pairs, first, resources)?;
-    let mut losses = Losses::new(lost, first, resources)?;
     let mut added = Added::new(domain, first, options, SLAB_ORIGINS, resources)?;
     let mut stats = ThickenStats::default();
-    // Walls and fills are as thick as they should be.
-    let is_judged = |triangle: &SoupTriangle, brick: u64| {
-        u64::from(triangle.source) < given && is_owned(triangle, domain, brick)
-    };
     let mut walk = soup.walk();
     while let Some(bin) = walk.next_bin()? {
         if resources.monitor.cancelled() {
             return Err(StoreError::Cancelled);
         }
-        let mut pieces: BTreeMap<u32, Hits> = BTreeMap::new();
-        bin.each(soup, |triangle| {
-            if is_judged(triangle, bin.brick.0) {
-                let sheet = sheets.side_of(triangle.source)?.first;
-                let hits = losses.hits_of(triangle, domain)?;
-                pieces.entry(sheet).or_default().add(hits);
-            }
-            Ok(())
-        })?;
-        pieces.retain(|_, hits| hits.lost > 0.0);
+        let pieces = losses.pieces_of(&bin, soup, &mut sheets)?;
         if pieces.is_empty() {
             continue;
         }
         stats.pieces += pieces.values().filter(|hits| hits.are_torn()).count() as u64;
         bin.each(soup, |triangle| {
-            if !is_judged(triangle, bin.brick.0) {
+            if !losses.is_judged(triangle, bin.brick) {
                 return Ok(());
             }
             let Some(piece) = pieces.get(&sheets.side_of(triangle.source)?.first) else {
                 return Ok(());
             };
-            if piece.tears(losses.hits_of(triangle, domain)?) {
+            if piece.tears(losses.hits_of(triangle)?) {
                 stats.add(triangle);
                 surround(triangle, options, &mut added)?;
             }
@@ -171,13 +121,6 @@ pub fn thicken(
     let (triangles, entries) = write_bins(added.bins, THICKENED, resources)?;
     let origins = added.origins.finish()?;
     Ok(Some((Thickened { triangles, entries, origins }, stats)))
-}
-
-/// How many edges of the grid a triangle hits on average.
-fn expected_hits(triangle: &SoupTriangle, domain: &Domain) -> f64 {
-    let [p, q, r] = triangle.corners.map(DVec3::from);
-    let projected = 0.5 * (q - p).cross(r - p).abs().element_sum();
-    projected / (domain.cell_size() * domain.cell_size())
 }
 
 /// Puts a slab around a triangle.
@@ -210,39 +153,6 @@ fn add_all(soup: &BinnedSoup, bins: &mut Sorter<BinTriangle>) -> Result<(), Stor
         }
     }
     Ok(())
-}
-
-/// The lost hits of every triangle.
-struct Losses {
-    counts: Table<u32>,
-}
-
-impl Losses {
-    fn new(
-        lost: Sorter<LostHits>,
-        triangles: u64,
-        resources: &Resources,
-    ) -> Result<Self, StoreError> {
-        let mut counts = Table::new(resources.scratch, resources.share_bytes / 8);
-        let mut sorted: Sorted<LostHits> = lost.finish()?;
-        let mut next = sorted.next()?;
-        for source in 0..triangles {
-            let mut count = 0;
-            while let Some(lost) = next
-                && u64::from(lost.source) == source
-            {
-                count += lost.count;
-                next = sorted.next()?;
-            }
-            counts.push(count)?;
-        }
-        Ok(Self { counts })
-    }
-
-    fn hits_of(&mut self, triangle: &SoupTriangle, domain: &Domain) -> Result<Hits, StoreError> {
-        let lost = f64::from(self.counts.get(triangle.source.into())?);
-        Ok(Hits { expected: expected_hits(triangle, domain), lost })
-    }
 }
 
 impl ThickenStats {

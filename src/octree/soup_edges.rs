@@ -99,6 +99,20 @@ impl SoupEdges {
         panes: Panes,
         resources: &Resources,
     ) -> Result<Self, StoreError> {
+        Self::find_in(soup, domain, panes, |_| true, resources)
+    }
+
+    /// Finds the edges of the bins that `wants` takes.
+    ///
+    /// # Errors
+    /// As [`Self::find`].
+    pub fn find_in(
+        soup: &BinnedSoup,
+        domain: &Domain,
+        panes: Panes,
+        wants: impl Fn(&SoupBin) -> bool + Send,
+        resources: &Resources,
+    ) -> Result<Self, StoreError> {
         let scratch = resources.scratch;
         let workers = resources.pool.current_num_threads() as u64;
         let share_bytes = resources.share_bytes / 2 / workers / SORTS;
@@ -108,10 +122,15 @@ impl SoupEdges {
         ordered(
             resources.pool,
             || {
-                if resources.monitor.cancelled() {
-                    return Err(StoreError::Cancelled);
+                while let Some(bin) = walk.next_bin()? {
+                    if resources.monitor.cancelled() {
+                        return Err(StoreError::Cancelled);
+                    }
+                    if wants(&bin) {
+                        return Ok(Some(bin));
+                    }
                 }
-                walk.next_bin()
+                Ok(None)
             },
             || {
                 let (pairs, borders) = (Outbox::new(&pairs), Outbox::new(&borders));

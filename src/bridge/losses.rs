@@ -1,0 +1,192 @@
+//! How much of its hits each triangle lost, and each piece of a sheet.
+//!
+//! In:         the hits that were lost, by triangle; the bins of the soup.
+//! Out:        [`Losses`].
+//! Units:      hits count edges of the grid.
+//! Memory:     4 bytes a triangle, in a table that spills; numbers of bricks and of a brick's pieces.
+//! Fails:      [`StoreError`].
+//! Source:     ours.
+
+use std::collections::{BTreeMap, BTreeSet};
+
+use glam::DVec3;
+
+use crate::bridge::sheets::Sheets;
+use crate::octree::points::is_owned;
+use crate::octree::{
+    BinnedSoup, BrickKey, Domain, LostHits, Panes, SoupBin, SoupEdges, SoupTriangle,
+};
+use crate::store::{Resources, Sorted, Sorter, StoreError, Table};
+
+/// Share of its hits that a wall loses when it is thin: of a plate that is t cells thick 1 - t.
+const LOST_SHARE: f64 = 0.15;
+
+/// Share of its hits that a large triangle of a torn piece has to lose to be taken for a part of it.
+const BRINK_SHARE: f64 = 0.03;
+
+/// Fewer lost hits than this are those of a tip or an edge.
+const LEAST_LOST: f64 = 4.0;
+
+/// A triangle that should have fewer hits tells nothing by itself.
+const LEAST_HITS: f64 = 8.0;
+
+/// Hits of a triangle, or of a sheet's triangles in one brick.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Hits {
+    expected: f64,
+    pub(crate) lost: f64,
+}
+
+impl Hits {
+    fn add(&mut self, other: Self) {
+        self.expected += other.expected;
+        self.lost += other.lost;
+    }
+
+    /// Whether a triangle of this piece is torn. A large one tells for itself, unless it is on the
+    /// brink.
+    pub(crate) fn tears(self, alone: Self) -> bool {
+        let is_large = alone.expected >= LEAST_HITS;
+        let takes_part = !is_large || alone.lost >= BRINK_SHARE * alone.expected;
+        is_large && alone.are_torn() || takes_part && self.are_torn()
+    }
+
+    pub(crate) fn are_torn(self) -> bool {
+        self.lost >= LEAST_LOST && self.lost >= LOST_SHARE * self.expected
+    }
+}
+
+/// How many edges of the grid a triangle hits on average.
+fn expected_hits(triangle: &SoupTriangle, domain: &Domain) -> f64 {
+    let [p, q, r] = triangle.corners.map(DVec3::from);
+    let projected = 0.5 * (q - p).cross(r - p).abs().element_sum();
+    projected / (domain.cell_size() * domain.cell_size())
+}
+
+/// The lost hits of every triangle.
+pub(crate) struct Losses<'d> {
+    counts: Table<u32>,
+    domain: &'d Domain,
+    given: u64,
+    triangles: u64,
+}
+
+impl<'d> Losses<'d> {
+    /// Of `triangles` triangles; the first `given` are those of the input.
+    pub(crate) fn new(
+        lost: Sorter<LostHits>,
+        domain: &'d Domain,
+        (given, triangles): (u64, u64),
+        resources: &Resources,
+    ) -> Result<Self, StoreError> {
+        let mut counts = Table::new(resources.scratch, resources.share_bytes / 8);
+        let mut sorted: Sorted<LostHits> = lost.finish()?;
+        let mut next = sorted.next()?;
+        for source in 0..triangles {
+            let mut count = 0;
+            while let Some(lost) = next
+                && u64::from(lost.source) == source
+            {
+                count += lost.count;
+                next = sorted.next()?;
+            }
+            counts.push(count)?;
+        }
+        Ok(Self { counts, domain, given, triangles })
+    }
+
+    /// Whether a triangle is judged in this brick. Walls and fills are as thick as they should be.
+    pub(crate) fn is_judged(&self, triangle: &SoupTriangle, brick: BrickKey) -> bool {
+        u64::from(triangle.source) < self.given && is_owned(triangle, self.domain, brick.0)
+    }
+
+    /// The hits of a triangle.
+    pub(crate) fn hits_of(&mut self, triangle: &SoupTriangle) -> Result<Hits, StoreError> {
+        let lost = f64::from(self.counts.get(triangle.source.into())?);
+        Ok(Hits { expected: expected_hits(triangle, self.domain), lost })
+    }
+
+    /// Those of the sheets in a brick that lost some, by the first triangle of the sheet.
+    pub(crate) fn pieces_of(
+        &mut self,
+        bin: &SoupBin,
+        soup: &BinnedSoup,
+        sheets: &mut Sheets,
+    ) -> Result<BTreeMap<u32, Hits>, StoreError> {
+        let mut pieces: BTreeMap<u32, Hits> = BTreeMap::new();
+        bin.each(soup, |triangle| {
+            if self.is_judged(triangle, bin.brick) {
+                let sheet = sheets.side_of(triangle.source)?.first;
+                pieces.entry(sheet).or_default().add(self.hits_of(triangle)?);
+            }
+            Ok(())
+        })?;
+        pieces.retain(|_, hits| hits.lost > 0.0);
+        Ok(pieces)
+    }
+
+    /// Whether some piece may be torn; never `false` where one is.
+    ///
+    /// Only bricks that lost enough for one are looked at, and sheets are joined in these alone. That
+    /// divides a piece further: where none of its parts loses the share, neither does the whole.
+    pub(crate) fn may_tear(
+        &mut self,
+        soup: &BinnedSoup,
+        resources: &Resources,
+    ) -> Result<bool, StoreError> {
+        let hurt = self.hurt_bricks(soup, resources)?;
+        if hurt.is_empty() {
+            return Ok(false);
+        }
+        let is_hurt = |bin: &SoupBin| hurt.contains(&bin.brick.0);
+        let edges = SoupEdges::find_in(soup, self.domain, Panes::Apart, is_hurt, resources)?;
+        let mut sheets = Sheets::join(edges.pairs, self.triangles, resources)?;
+        let mut walk = soup.walk();
+        while let Some(bin) = walk.next_bin()? {
+            if !is_hurt(&bin) {
+                continue;
+            }
+            let pieces = self.pieces_of(&bin, soup, &mut sheets)?;
+            if pieces.values().any(|hits| hits.lost >= LOST_SHARE * hits.expected) {
+                return Ok(true);
+            }
+            let mut is_torn = false;
+            bin.each(soup, |triangle| {
+                is_torn |=
+                    self.is_judged(triangle, bin.brick) && self.hits_of(triangle)?.are_torn();
+                Ok(())
+            })?;
+            if is_torn {
+                return Ok(true);
+            }
+        }
+        Ok(false)
+    }
+
+    /// The bricks that lost enough hits for a piece that is torn.
+    fn hurt_bricks(
+        &mut self,
+        soup: &BinnedSoup,
+        resources: &Resources,
+    ) -> Result<BTreeSet<u64>, StoreError> {
+        let mut hurt = BTreeSet::new();
+        let mut walk = soup.walk();
+        while let Some(bin) = walk.next_bin()? {
+            if resources.monitor.cancelled() {
+                return Err(StoreError::Cancelled);
+            }
+            let mut lost = 0.0;
+            bin.each(soup, |triangle| {
+                let count = self.counts.get(triangle.source.into())?;
+                if count > 0 && self.is_judged(triangle, bin.brick) {
+                    lost += f64::from(count);
+                }
+                Ok(())
+            })?;
+            if lost >= LEAST_LOST {
+                hurt.insert(bin.brick.0);
+            }
+        }
+        Ok(hurt)
+    }
+}
