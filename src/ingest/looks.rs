@@ -20,7 +20,6 @@ use bytemuck::{Pod, Zeroable};
 use crate::geom::mix;
 use crate::ingest::charts::Charts;
 use crate::io::{IoError, Palette};
-use crate::mesh::OtherMaps;
 use crate::octree::{AttributeRecord, CLOSES, SoupTriangle, TRANSPARENT};
 use crate::store::{
     Labels, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError, Table,
@@ -119,7 +118,7 @@ fn mapped_materials(palette: &Palette, resources: &Resources) -> Result<Table<u8
     let mut is_mapped = Table::new(resources.scratch, resources.share_bytes / 16);
     let mut any = false;
     palette.for_each(|_, material| {
-        let shows = material.texture.is_some() || material.other_maps != OtherMaps::default();
+        let shows = material.is_mapped();
         any |= shows;
         Ok(is_mapped.push(u8::from(shows))?)
     })?;

@@ -41,11 +41,13 @@ pub(super) fn write_materials<S: MeshSource + ?Sized>(
             return Err(StoreError::Cancelled.into());
         }
         let mut material = source.material(number).map_err(IngestError::Source)?;
-        if let Some(Texture::Inside(image)) = &mut material.texture
-            && !palette.place(image)?
-        {
-            keep_image(source, image.number, &mut palette, resources)?;
-            palette.place(image)?;
+        for texture in material.texture.iter_mut().chain(material.maps.images_mut()) {
+            if let Texture::Inside(image) = texture
+                && !palette.place(image)?
+            {
+                keep_image(source, image.number, &mut palette, resources)?;
+                palette.place(image)?;
+            }
         }
         palette.push(&material)?;
     }

@@ -10,8 +10,8 @@ use crate::io::{
     images_beside, lost_of_materials, open, reopen, write_library,
 };
 use crate::mesh::{
-    Attributes, CornerForm, CornerValues, Material, SinkState, SinkTriangles, Surface, Texture,
-    VertexValues,
+    Attributes, CornerForm, CornerValues, Maps, Material, SinkState, SinkTriangles, Surface,
+    Texture, VertexValues,
 };
 use crate::store::{Scratch, SpoolWriter};
 
@@ -300,14 +300,30 @@ fn outcome(
     input: &Path,
     scratch: &Scratch,
 ) -> Result<Outcome, IoError> {
+    let materials: Vec<_> = textures
+        .iter()
+        .enumerate()
+        .map(|(number, texture)| {
+            let texture = Some(Texture::Beside((*texture).to_owned()));
+            Material { name: number.to_string(), texture, ..Material::default() }
+        })
+        .collect();
+    let (found, lost) = passed(&materials, format, input, scratch)?;
+    Ok((found.images, lost))
+}
+
+/// Materials as they come back from an output, and what was told to be lost.
+fn passed(
+    materials: &[Material],
+    format: Format,
+    input: &Path,
+    scratch: &Scratch,
+) -> Result<(Model, Vec<String>), IoError> {
     let mut writer = PaletteWriter::create(scratch)?;
-    for (number, texture) in textures.iter().enumerate() {
-        let texture = Some(Texture::Beside((*texture).to_owned()));
-        writer.push(&Material { name: number.to_string(), texture, ..Material::default() })?;
-    }
+    materials.iter().try_for_each(|material| writer.push(material))?;
+    let count = materials.len() as u32;
     let [materials, images] = writer.finish()?;
     let palette = Palette::new(scratch, &materials).with_images(&images, input);
-    let count = textures.len() as u32;
     let mut content = Content::default();
     for number in 0..count {
         let x = f64::from(number);
@@ -319,8 +335,60 @@ fn outcome(
     let path = input.with_file_name(format!("out.{ending}"));
     let options = write(&model, (format, &path), None, scratch);
     let lost = lost_of_materials(&model.palette, format, &options, scratch)?;
-    let found = load(&path, scratch);
-    Ok((found.images, lost))
+    Ok((load(&path, scratch), lost))
+}
+
+#[test]
+fn further_maps_are_in_a_glb_and_told_to_be_lost_elsewhere() {
+    let folder = tempfile::tempdir().expect("a temporary folder");
+    let scratch = Scratch::new(folder.path());
+    let image = |name: &str| Texture::Beside(name.to_owned());
+    for (name, bytes) in [("a.png", PNG), ("n.png", &[PNG, b"n"].concat()), ("g.jpg", JPEG)] {
+        std::fs::write(folder.path().join(name), bytes).expect("written");
+    }
+    let maps = Maps {
+        normal: Some((image("n.png"), 0.5)),
+        gloss: Some(image("g.jpg")),
+        emission: Some(image("nowhere.png")),
+        occlusion: Some((image("g.jpg"), 0.25)),
+    };
+    let material = Material {
+        name: "wood".to_owned(),
+        metallic: Some(0.5),
+        roughness: Some(0.75),
+        emissive: Some([1.0; 3]),
+        texture: Some(image("a.png")),
+        maps,
+        ..Material::default()
+    };
+    let input = folder.path().join("input.glb");
+    let (found, lost) =
+        passed(std::slice::from_ref(&material), Format::Glb, &input, &scratch).expect("written");
+    let Material { maps, metallic, roughness, emissive, .. } = &found.content.materials[0];
+    assert_eq!((*metallic, *roughness, *emissive), (Some(0.5), Some(0.75), None));
+    let names = maps.images().map(|(_, image)| image.map(Texture::name));
+    assert_eq!(
+        names,
+        [Some("n.png"), Some("g.jpg"), None, Some("g.jpg")].map(|n| n.map(String::from))
+    );
+    let factors = (maps.normal.as_ref().map(|m| m.1), maps.occlusion.as_ref().map(|m| m.1));
+    assert_eq!(factors, (Some(0.5), Some(0.25)));
+    assert_eq!(lost, ["emission maps"]);
+    let mut source =
+        open(&folder.path().join("out.glb"), &scratch, &ReadOptions::in_scene(1 << 20))
+            .expect("opens");
+    let of_maps = [&maps.normal.as_ref().expect("there").0, maps.gloss.as_ref().expect("there")];
+    let bytes = of_maps.map(|image| match image {
+        Texture::Inside(image) => image_of(&mut source, image.number),
+        Texture::Beside(name) => panic!("{name} is beside"),
+    });
+    assert_eq!(bytes, [[PNG, b"n"].concat(), JPEG.to_vec()]);
+    // Factors mean nothing without their maps.
+    let (found, lost) = passed(&[material], Format::Obj, &input, &scratch).expect("written");
+    let Material { metallic, roughness, emissive, .. } = &found.content.materials[0];
+    assert_eq!((*metallic, *roughness, *emissive), (None, None, None));
+    let kinds = ["normal maps", "roughness and metalness maps", "emission maps", "occlusion maps"];
+    assert_eq!(lost, kinds);
 }
 
 #[test]

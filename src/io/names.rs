@@ -7,7 +7,7 @@ use std::path::Path;
 use bytemuck::{Pod, Zeroable};
 
 use crate::io::error::IoError;
-use crate::mesh::{Material, OtherMaps, Part, Texture};
+use crate::mesh::{Maps, Material, OtherMaps, Part, Texture};
 use crate::store::{Dictionary, Scratch, StoreError, Table};
 
 /// Numbered parts.
@@ -106,6 +106,7 @@ impl Materials {
             roughness: has(HAS_ROUGHNESS).then_some(properties.roughness),
             alpha_cutoff: None,
             texture: texture.map(|number| self.texture(number)).transpose()?,
+            maps: Maps::default(),
             other_maps: OtherMaps::from_bits((properties.flags >> MAPS_SHIFT) as u8),
         })
     }

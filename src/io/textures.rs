@@ -17,7 +17,7 @@ use crate::io::image_kind::ImageKind;
 use crate::io::input::Input;
 use crate::io::palette::Palette;
 use crate::io::{Format, WriteOptions};
-use crate::mesh::{Attributes, OtherMaps, Texture};
+use crate::mesh::{Attributes, Material, OtherMaps, Texture};
 use crate::store::{Dictionary, Scratch, Spool, Table};
 
 const SHARE_BYTES: u64 = 48 << 10;
@@ -55,7 +55,8 @@ pub(crate) struct Textures {
     names: Dictionary,
     numbers: Table<u32>,
     images: Table<Record>,
-    of_material: Table<u32>,
+    /// Of the base colour, and of the further maps.
+    of_material: Table<[u32; 5]>,
 }
 
 impl Textures {
@@ -82,11 +83,19 @@ impl Textures {
         textures.folder = folder_of(palette.input());
         textures.inside = palette.open_images()?;
         palette.for_each(|material, properties| {
-            let number = match properties.texture {
-                Some(texture) if is_used(material)? => textures.number(&texture, format)?,
-                _ => NONE,
-            };
-            Ok(textures.of_material.push(number)?)
+            let mut numbers = [NONE; 5];
+            if is_used(material)? {
+                let properties = as_held(properties, format);
+                let maps = properties.maps.images().map(|(_, image)| image);
+                for (image, number) in
+                    [properties.texture.as_ref()].into_iter().chain(maps).zip(&mut numbers)
+                {
+                    if let Some(image) = image {
+                        *number = textures.number(image, format)?;
+                    }
+                }
+            }
+            Ok(textures.of_material.push(numbers)?)
         })?;
         Ok(textures)
     }
@@ -144,13 +153,18 @@ impl Textures {
         self.images.len()
     }
 
-    /// The image of a material, if it has one.
+    /// The image of a material's base colour, if it has one.
     pub(crate) fn of_material(&mut self, material: u32) -> Result<Option<u32>, IoError> {
+        Ok(self.all_of_material(material)?[0])
+    }
+
+    /// The images of a material: of its base colour, and of its further maps in their order.
+    pub(crate) fn all_of_material(&mut self, material: u32) -> Result<[Option<u32>; 5], IoError> {
         if u64::from(material) >= self.of_material.len() {
-            return Ok(None);
+            return Ok([None; 5]);
         }
-        let number = self.of_material.get(material.into())?;
-        Ok((number != NONE).then_some(number))
+        let numbers = self.of_material.get(material.into())?;
+        Ok(numbers.map(|number| (number != NONE).then_some(number)))
     }
 
     /// An image by its number, which is below the count.
@@ -216,6 +230,15 @@ impl Textures {
     }
 }
 
+/// A material, without those maps that a format cannot hold.
+pub(crate) fn as_held(material: Material, format: Format) -> Material {
+    if format == Format::Glb {
+        return material;
+    }
+    let kinds = material.maps.kinds();
+    material.losing(kinds)
+}
+
 /// The way from a folder to a file, both canonical; with slashes, and no option to any reader.
 fn way(folder: &Path, file: &Path) -> Option<String> {
     let shared = folder.components().zip(file.components()).take_while(|(a, b)| a == b).count();
@@ -259,7 +282,14 @@ pub fn lost_of_materials(
     let mut textures = Textures::find(palette, format, scratch, |_| Ok(true))?;
     let attributes = options.attributes.and(format.attributes());
     palette.for_each(|number, material| {
+        let material = as_held(material, format);
         maps = maps.with(material.other_maps);
+        let [_, of_maps @ ..] = textures.all_of_material(number)?;
+        for ((kind, image), shown) in material.maps.images().into_iter().zip(of_maps) {
+            if image.is_some() && (shown.is_none() || !attributes.uvs) {
+                maps = maps.with(kind);
+            }
+        }
         let Some(texture) = &material.texture else { return Ok(()) };
         let is_held = match textures.of_material(number)?.filter(|_| attributes.uvs) {
             Some(image) if refers(format, attributes) => {

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::mesh::{OtherMaps, Texture};
+use crate::mesh::{Maps, OtherMaps, Texture};
 
 /// A material of a file. What the file does not state is `None`.
 #[derive(Clone, Debug, PartialEq, Default, Serialize, Deserialize)]
@@ -27,7 +27,10 @@ pub struct Material {
     pub alpha_cutoff: Option<f32>,
     /// Image of the base colour.
     pub texture: Option<Texture>,
-    /// Further maps, of which no more is known.
+    /// Its further maps.
+    #[serde(default)]
+    pub maps: Maps,
+    /// Kinds of maps, of which no more is known: no output has them.
     #[serde(default)]
     pub other_maps: OtherMaps,
 }
@@ -36,6 +39,27 @@ pub struct Material {
 const GREY: [f32; 3] = [0.8; 3];
 
 impl Material {
+    /// As it is where maps of some kinds are lost: their factors mean nothing without them.
+    #[must_use]
+    pub fn losing(mut self, kinds: OtherMaps) -> Self {
+        self.maps.leave_out(kinds);
+        if kinds.has(OtherMaps::GLOSS) {
+            (self.metallic, self.roughness) = (None, None);
+        }
+        if kinds.has(OtherMaps::EMISSION) {
+            self.emissive = None;
+        }
+        self.other_maps = self.other_maps.with(kinds);
+        self
+    }
+
+    /// Whether it shows any image.
+    #[must_use]
+    pub fn is_mapped(&self) -> bool {
+        let others = self.other_maps.with(self.maps.kinds());
+        self.texture.is_some() || others != OtherMaps::default()
+    }
+
     /// Colour and opacity as bytes, for formats that must have them.
     #[must_use]
     pub fn rgba(&self) -> [u8; 4] {

@@ -22,5 +22,5 @@ pub use sink::{
     SinkTriangles, VertexValues,
 };
 pub use source::{Discarded, MeshSource};
-pub use texture::{Image, OtherMaps, Texture};
+pub use texture::{Image, Maps, OtherMaps, Texture};
 pub use unit::LengthUnit;

@@ -36,7 +36,55 @@ pub struct Image {
     pub bytes: u64,
 }
 
-/// Maps of a material that no output holds yet, as a set.
+/// Maps of a material that lie on the texture coordinates of its base colour. What a map has factors
+/// for is multiplied by them.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Maps {
+    /// Normals against the surface, and how far they lean: a factor.
+    pub normal: Option<(Texture, f32)>,
+    /// Roughness in green and metalness in blue; the material's are its factors.
+    pub gloss: Option<Texture>,
+    /// Light of its own, in sRGB; the material's is its factor.
+    pub emission: Option<Texture>,
+    /// Share of the light around that reaches the hollows, in red, and how much of that counts.
+    pub occlusion: Option<(Texture, f32)>,
+}
+
+impl Maps {
+    /// Each kind with its image, if there is one: normals, gloss, emission, occlusion.
+    pub fn images(&self) -> [(OtherMaps, Option<&Texture>); 4] {
+        [
+            (OtherMaps::NORMAL, self.normal.as_ref().map(|(image, _)| image)),
+            (OtherMaps::GLOSS, self.gloss.as_ref()),
+            (OtherMaps::EMISSION, self.emission.as_ref()),
+            (OtherMaps::OCCLUSION, self.occlusion.as_ref().map(|(image, _)| image)),
+        ]
+    }
+
+    /// The images, to be changed.
+    pub fn images_mut(&mut self) -> impl Iterator<Item = &mut Texture> {
+        let normal = self.normal.as_mut().map(|(image, _)| image);
+        let occlusion = self.occlusion.as_mut().map(|(image, _)| image);
+        [normal, self.gloss.as_mut(), self.emission.as_mut(), occlusion].into_iter().flatten()
+    }
+
+    /// Leaves out the maps of some kinds.
+    pub fn leave_out(&mut self, kinds: OtherMaps) {
+        self.normal.take_if(|_| kinds.has(OtherMaps::NORMAL));
+        self.gloss.take_if(|_| kinds.has(OtherMaps::GLOSS));
+        self.emission.take_if(|_| kinds.has(OtherMaps::EMISSION));
+        self.occlusion.take_if(|_| kinds.has(OtherMaps::OCCLUSION));
+    }
+
+    /// The kinds there are.
+    #[must_use]
+    pub fn kinds(&self) -> OtherMaps {
+        let there = self.images().into_iter().filter(|(_, image)| image.is_some());
+        there.fold(OtherMaps::default(), |all, (kind, _)| all.with(kind))
+    }
+}
+
+/// Kinds of maps of a material, as a set.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct OtherMaps(u8);
 
@@ -64,6 +112,12 @@ impl OtherMaps {
     #[must_use]
     pub const fn with(self, other: Self) -> Self {
         Self(self.0 | other.0)
+    }
+
+    /// Whether it has all of those.
+    #[must_use]
+    pub const fn has(self, others: Self) -> bool {
+        self.0 & others.0 == others.0
     }
 
     /// As a number, for records.

@@ -11,7 +11,7 @@ use crate::io::image_kind::ImageKind;
 use crate::io::output::Output;
 use crate::io::palette::Palette;
 use crate::io::textures::Shown;
-use crate::mesh::{Material, Surface};
+use crate::mesh::{Material, OtherMaps, Surface};
 
 const STRENGTH: &str = "KHR_materials_emissive_strength";
 
@@ -28,12 +28,20 @@ pub(crate) fn write_materials(
     let mut has_strength = false;
     let mut write = |number: u64, mut material: Material| {
         let used = if number < count { counts.get(number)? } else { [0; 2] };
-        let texture = textures.of_material(number as u32)?;
+        let shown = textures.all_of_material(number as u32)?;
+        let lost = material
+            .maps
+            .images()
+            .into_iter()
+            .zip(&shown[1..])
+            .filter(|((_, image), shown)| image.is_some() && shown.is_none());
+        let lost = lost.fold(OtherMaps::default(), |all, ((kind, _), _)| all.with(kind));
+        material = material.losing(lost);
         for (suffix, _) in
             ["", Surface::PATCH_ENDING].iter().zip(used).filter(|&(_, count)| count > 0)
         {
             material.name.push_str(suffix);
-            let text = Stated::new(&material, texture);
+            let text = Stated::new(&material, shown);
             has_strength |= text.extensions.is_some();
             let text = serde_json::to_string(&text).expect("numbers and texts serialise");
             let comma = if written > 0 { "," } else { "" };
@@ -120,6 +128,12 @@ struct Stated<'m> {
     alpha_cutoff: Option<f32>,
     pbr_metallic_roughness: StatedPbr,
     #[serde(skip_serializing_if = "Option::is_none")]
+    normal_texture: Option<StatedTexture>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    occlusion_texture: Option<StatedTexture>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    emissive_texture: Option<StatedTexture>,
+    #[serde(skip_serializing_if = "Option::is_none")]
     emissive_factor: Option<[f32; 3]>,
     #[serde(skip_serializing_if = "Option::is_none")]
     extensions: Option<StatedExtensions>,
@@ -131,6 +145,8 @@ struct StatedPbr {
     base_color_factor: [f32; 4],
     #[serde(skip_serializing_if = "Option::is_none")]
     base_color_texture: Option<StatedTexture>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    metallic_roughness_texture: Option<StatedTexture>,
     metallic_factor: f32,
     roughness_factor: f32,
 }
@@ -138,6 +154,12 @@ struct StatedPbr {
 #[derive(Serialize)]
 struct StatedTexture {
     index: u32,
+    /// Of normals.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    scale: Option<f32>,
+    /// Of the shadows of hollows.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    strength: Option<f32>,
 }
 
 #[derive(Serialize)]
@@ -153,7 +175,21 @@ struct StatedStrength {
 }
 
 impl<'m> Stated<'m> {
-    fn new(material: &'m Material, texture: Option<u32>) -> Self {
+    fn new(material: &'m Material, shown: [Option<u32>; 5]) -> Self {
+        let plain = |index| StatedTexture { index, scale: None, strength: None };
+        let [texture, normal, gloss, emission, occlusion] = shown.map(|index| index.map(plain));
+        let normal = normal.map(|normal| {
+            let scale = material.maps.normal.as_ref().map(|(_, scale)| *scale);
+            StatedTexture {
+                scale: scale.filter(|&scale| scale != 1.0 && scale.is_finite()),
+                ..normal
+            }
+        });
+        let occlusion = occlusion.map(|occlusion| {
+            let strength =
+                material.maps.occlusion.as_ref().map(|(_, strength)| strength.clamp(0.0, 1.0));
+            StatedTexture { strength: strength.filter(|&strength| strength < 1.0), ..occlusion }
+        });
         let unit = |number: f32| if number.is_nan() { 0.0 } else { number.clamp(0.0, 1.0) };
         let [red, green, blue] = material.diffuse.unwrap_or([1.0; 3]).map(unit);
         let alpha = if material.transparent { unit(material.opacity.unwrap_or(1.0)) } else { 1.0 };
@@ -169,10 +205,14 @@ impl<'m> Stated<'m> {
             alpha_cutoff: cutoff,
             pbr_metallic_roughness: StatedPbr {
                 base_color_factor: [red, green, blue, alpha],
-                base_color_texture: texture.map(|index| StatedTexture { index }),
+                base_color_texture: texture,
+                metallic_roughness_texture: gloss,
                 metallic_factor: unit(material.metallic.unwrap_or(0.0)),
                 roughness_factor: unit(material.roughness.unwrap_or(1.0)),
             },
+            normal_texture: normal,
+            occlusion_texture: occlusion,
+            emissive_texture: emission,
             emissive_factor: emissive
                 .map(|colour| colour.map(|channel| unit(channel / strength.unwrap_or(1.0)))),
             extensions: strength.map(|emissive_strength| StatedExtensions {

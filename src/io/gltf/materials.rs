@@ -8,13 +8,11 @@ use crate::io::gltf::model::{MaterialRecord, Model, NONE};
 use crate::io::gltf::schema::Material as Stated;
 use crate::io::gltf::schema::TextureInfo;
 use crate::io::gltf::text::DATA_MARK;
-use crate::mesh::{Image, Material, OtherMaps, Texture};
+use crate::mesh::{Image, Maps, Material, OtherMaps, Texture};
 
 const TRANSPARENT: u32 = 1;
 const HAS_BASE: u32 = 2;
 const HAS_EMISSIVE: u32 = 4;
-const HAS_METALLIC: u32 = 8;
-const HAS_ROUGHNESS: u32 = 16;
 const BLENDS: u32 = 32;
 const HAS_CUTOFF: u32 = 64;
 /// Where images are cut off, if it is not stated.
@@ -24,6 +22,10 @@ const MAPS_SHIFT: u32 = 8;
 
 /// Texture coordinates as they are.
 pub(crate) const UV_IDENTITY: [[f32; 3]; 2] = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+
+/// Kinds of further maps, in the order of [`MaterialRecord::maps`].
+const KINDS: [OtherMaps; 4] =
+    [OtherMaps::NORMAL, OtherMaps::GLOSS, OtherMaps::EMISSION, OtherMaps::OCCLUSION];
 
 /// What is stated; the texture by its number.
 pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
@@ -37,27 +39,28 @@ pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
         (blends || transmits, TRANSPARENT),
         (blends, BLENDS),
         (pbr.base_color_factor.is_some(), HAS_BASE),
-        (material.emissive_factor.is_some() && material.emissive_texture.is_none(), HAS_EMISSIVE),
+        (material.emissive_factor.is_some(), HAS_EMISSIVE),
         (cuts, HAS_CUTOFF),
-        // What is not stated is one, which other formats do not know. Factors of a map mean nothing
-        // without it.
-        (pbr.metallic_roughness_texture.is_none(), HAS_METALLIC),
-        (pbr.metallic_roughness_texture.is_none(), HAS_ROUGHNESS),
     ];
-    let maps = [
-        (material.normal_texture.is_some(), OtherMaps::NORMAL),
-        (pbr.metallic_roughness_texture.is_some(), OtherMaps::GLOSS),
-        (material.emissive_texture.is_some(), OtherMaps::EMISSION),
-        (material.occlusion_texture.is_some(), OtherMaps::OCCLUSION),
-    ];
-    let maps = maps.iter().filter(|(has, _)| *has);
-    let maps = maps.fold(OtherMaps::default(), |all, (_, map)| all.with(*map));
-    let (uv_set, uv_map) = pbr.base_color_texture.as_ref().map_or((0, UV_IDENTITY), uv_map);
-    let emissive = material.emissive_factor.unwrap_or_default();
     let flags: u32 = flags.iter().map(|&(has, flag)| if has { flag } else { 0 }).sum();
+    let maps = [
+        &material.normal_texture,
+        &pbr.metallic_roughness_texture,
+        &material.emissive_texture,
+        &material.occlusion_texture,
+    ];
+    // There are one pair of coordinates: those of the first map. Others on the same are kept.
+    let leading = [&pbr.base_color_texture].into_iter().chain(maps).flatten().next();
+    let (uv_set, uv_map) = leading.map_or((0, UV_IDENTITY), uv_map_of);
+    let kept = maps.map(|map| map.as_ref().filter(|map| uv_map_of(map) == (uv_set, uv_map)));
+    let lost = (0..4).filter(|&i| maps[i].is_some() && kept[i].is_none());
+    let lost = lost.fold(OtherMaps::default(), |all, i| all.with(KINDS[i]));
+    let scale_of =
+        |map: &Option<TextureInfo>| map.as_ref().and_then(|map| map.scale).unwrap_or(1.0);
+    let emissive = material.emissive_factor.unwrap_or_default();
     MaterialRecord {
         name,
-        flags: flags | u32::from(maps.bits()) << MAPS_SHIFT,
+        flags: flags | u32::from(lost.bits()) << MAPS_SHIFT,
         uv_set,
         uv_map,
         base: pbr.base_color_factor.unwrap_or([1.0; 4]),
@@ -66,6 +69,9 @@ pub(crate) fn record(material: &Stated, name: u32) -> MaterialRecord {
         roughness: pbr.roughness_factor.unwrap_or(1.0),
         alpha_cutoff: material.alpha_cutoff.unwrap_or(CUTOFF),
         texture: pbr.base_color_texture.as_ref().map_or(NONE, |texture| texture.index),
+        maps: kept.map(|map| map.map_or(NONE, |texture| texture.index)),
+        normal_scale: scale_of(&material.normal_texture),
+        occlusion_strength: scale_of(&material.occlusion_texture),
         ..MaterialRecord::zeroed()
     }
 }
@@ -80,22 +86,35 @@ pub(crate) fn material(model: &mut Model, number: u32) -> Result<Material, IoErr
     // What is too large for a number is not stated.
     let is_finite = |colour: &[f32; 3]| colour.iter().all(|channel| channel.is_finite());
     let [red, green, blue, alpha] = record.base;
-    Ok(Material {
+    let [normal, gloss, emission, occlusion] = record.maps;
+    let maps = Maps {
+        normal: image_of(model, normal)?.map(|image| (image, record.normal_scale)),
+        gloss: image_of(model, gloss)?,
+        emission: image_of(model, emission)?,
+        occlusion: image_of(model, occlusion)?.map(|image| (image, record.occlusion_strength)),
+    };
+    let named = (0..4).filter(|&i| record.maps[i] != NONE).map(|i| KINDS[i]);
+    let lost = named.filter(|kind| !maps.kinds().has(*kind));
+    let lost = lost.fold(OtherMaps::from_bits((record.flags >> MAPS_SHIFT) as u8), OtherMaps::with);
+    let material = Material {
         name: model.text_of(record.name)?.unwrap_or_default(),
         transparent: has(TRANSPARENT),
         diffuse: has(HAS_BASE).then_some([red, green, blue]).filter(is_finite),
         opacity: has(BLENDS).then_some(alpha.clamp(0.0, 1.0)),
         emissive: has(HAS_EMISSIVE).then_some(record.emissive).filter(is_finite),
-        metallic: has(HAS_METALLIC).then_some(record.metallic).filter(|x| x.is_finite()),
-        roughness: has(HAS_ROUGHNESS).then_some(record.roughness).filter(|x| x.is_finite()),
+        // What is not stated is one, which other formats do not know.
+        metallic: Some(record.metallic).filter(|x| x.is_finite()),
+        roughness: Some(record.roughness).filter(|x| x.is_finite()),
         alpha_cutoff: has(HAS_CUTOFF).then_some(record.alpha_cutoff).filter(|x| x.is_finite()),
         texture: image_of(model, record.texture)?,
-        other_maps: OtherMaps::from_bits((record.flags >> MAPS_SHIFT) as u8),
-    })
+        maps,
+        other_maps: OtherMaps::default(),
+    };
+    Ok(material.losing(lost))
 }
 
 /// Which texture coordinates a texture takes, and how they are mapped.
-fn uv_map(texture: &TextureInfo) -> (u32, [[f32; 3]; 2]) {
+fn uv_map_of(texture: &TextureInfo) -> (u32, [[f32; 3]; 2]) {
     let Some(transform) = &texture.extensions.transform else {
         return (texture.tex_coord, UV_IDENTITY);
     };

@@ -141,6 +141,10 @@ pub(crate) struct MaterialRecord {
     pub(crate) roughness: f32,
     pub(crate) alpha_cutoff: f32,
     pub(crate) texture: u32,
+    /// The textures of its further maps: normals, gloss, emission, occlusion.
+    pub(crate) maps: [u32; 4],
+    pub(crate) normal_scale: f32,
+    pub(crate) occlusion_strength: f32,
     /// Which texture coordinates it takes, and the map that they go through: rows of three.
     pub(crate) uv_set: u32,
     pub(crate) uv_map: [[f32; 3]; 2],

@@ -167,9 +167,9 @@ pub(crate) struct Material {
     pub(crate) emissive_factor: Option<[f32; 3]>,
     #[serde(default)]
     pub(crate) pbr_metallic_roughness: Pbr,
-    pub(crate) normal_texture: Option<IgnoredAny>,
-    pub(crate) occlusion_texture: Option<IgnoredAny>,
-    pub(crate) emissive_texture: Option<IgnoredAny>,
+    pub(crate) normal_texture: Option<TextureInfo>,
+    pub(crate) occlusion_texture: Option<TextureInfo>,
+    pub(crate) emissive_texture: Option<TextureInfo>,
     #[serde(default)]
     pub(crate) extensions: MaterialExtensions,
 }
@@ -181,7 +181,7 @@ pub(crate) struct Pbr {
     pub(crate) base_color_texture: Option<TextureInfo>,
     pub(crate) metallic_factor: Option<f32>,
     pub(crate) roughness_factor: Option<f32>,
-    pub(crate) metallic_roughness_texture: Option<IgnoredAny>,
+    pub(crate) metallic_roughness_texture: Option<TextureInfo>,
 }
 
 #[derive(serde::Deserialize)]
@@ -190,6 +190,9 @@ pub(crate) struct TextureInfo {
     pub(crate) index: u32,
     #[serde(default)]
     pub(crate) tex_coord: u32,
+    /// Of normals, or of the shadows of hollows.
+    #[serde(alias = "strength")]
+    pub(crate) scale: Option<f32>,
     #[serde(default)]
     pub(crate) extensions: TextureInfoExtensions,
 }

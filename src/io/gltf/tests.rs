@@ -6,7 +6,7 @@ use serde_json::{Value, json};
 
 use crate::io::tests::{Content, read_all, read_bytes};
 use crate::io::{IoError, ReadOptions, open};
-use crate::mesh::{Material, OtherMaps, Texture};
+use crate::mesh::{Maps, Material, OtherMaps, Texture};
 use crate::store::Scratch;
 
 /// A GLB file.
@@ -267,6 +267,7 @@ fn materials_are_numbered_as_they_are_used_and_may_share_names() {
         roughness: Some(0.75),
         alpha_cutoff: None,
         texture: Some(Texture::Beside("a b.png".to_owned())),
+        maps: Maps::default(),
         other_maps: OtherMaps::default(),
     };
     let glass = Material {
@@ -285,12 +286,20 @@ fn factors_of_maps_mean_nothing_without_them_and_images_are_cut_off() {
         json["meshes"][0]["primitives"][0]["material"] = json!(0);
         let pbr = json!({"metallicFactor": 0.5, "metallicRoughnessTexture": {"index": 0}});
         json["materials"] = json!([{"pbrMetallicRoughness": pbr, "alphaMode": "MASK",
-            "emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0}}]);
+            "emissiveFactor": [1.0, 1.0, 1.0], "emissiveTexture": {"index": 0, "texCoord": 1},
+            "normalTexture": {"index": 7}, "occlusionTexture": {"index": 0, "strength": 0.5}}]);
         json["textures"] = json!([{"source": 0}]);
         json["images"] = json!([{"uri": "a.png"}]);
     });
     let material = &content.materials[0];
-    assert_eq!((material.metallic, material.roughness, material.emissive), (None, None, None));
+    // The first map says which coordinates there are; a texture that is none is no map.
+    let image = Texture::Beside("a.png".to_owned());
+    let kept =
+        Maps { gloss: Some(image.clone()), occlusion: Some((image, 0.5)), ..Maps::default() };
+    assert_eq!(material.maps, kept);
+    assert_eq!(material.other_maps, OtherMaps::NORMAL.with(OtherMaps::EMISSION));
+    let factors = (material.metallic, material.roughness, material.emissive);
+    assert_eq!(factors, (Some(0.5), Some(1.0), None));
     assert_eq!((material.alpha_cutoff, material.transparent), (Some(0.5), false));
 }
 
@@ -423,8 +432,15 @@ fn texture_coordinates_are_mapped_and_turned_as_the_material_says() {
         for found in content.batch.uvs.as_flattened().iter() {
             assert!((found[0] - uv[0]).abs() + (found[1] - uv[1]).abs() < 1e-6, "{info} {found:?}");
         }
-        let maps = content.materials[0].other_maps;
-        assert_eq!(maps, OtherMaps::NORMAL.with(OtherMaps::GLOSS));
+        // Other maps lie on the coordinates as they are.
+        let maps = OtherMaps::NORMAL.with(OtherMaps::GLOSS);
+        let (kept, lost) = if info == json!({"index": 0}) {
+            (maps, OtherMaps::default())
+        } else {
+            (OtherMaps::default(), maps)
+        };
+        let material = &content.materials[0];
+        assert_eq!((material.maps.kinds(), material.other_maps), (kept, lost), "{info}");
     }
 }
 

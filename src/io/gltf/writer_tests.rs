@@ -7,7 +7,7 @@ use serde_json::{Value, json};
 use crate::io::gltf::tests::read_file;
 use crate::io::tests::Content;
 use crate::io::{Format, IoError, Palette, PaletteWriter, Sink, WriteOptions, create, reopen};
-use crate::mesh::{Material, OtherMaps, SinkState, SinkTriangles, Surface, Texture};
+use crate::mesh::{Maps, Material, OtherMaps, SinkState, SinkTriangles, Surface, Texture};
 use crate::store::Scratch;
 
 fn materials() -> Vec<Material> {
@@ -23,6 +23,7 @@ fn materials() -> Vec<Material> {
             roughness: Some(0.1),
             alpha_cutoff: None,
             texture: Some(Texture::Beside("a.png".to_owned())),
+            maps: Maps::default(),
             other_maps: OtherMaps::default(),
         },
         Material { name: "\"wood\"".to_owned(), ..Material::default() },

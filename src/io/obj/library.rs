@@ -10,7 +10,7 @@ use std::path::Path;
 use crate::io::error::IoError;
 use crate::io::output::Output;
 use crate::io::output_names::OutputNames;
-use crate::io::textures::Textures;
+use crate::io::textures::{Textures, as_held};
 use crate::io::{Format, Palette, WriteOptions};
 use crate::mesh::{Material, Surface};
 use crate::store::Scratch;
@@ -44,6 +44,7 @@ pub fn write_library(
     };
     let kinds = if options.tag_patches { &[false, true][..] } else { &[false] };
     palette.for_each(|number, material| {
+        let material = as_held(material, Format::Obj);
         let image = textures.of_material(number)?;
         let image = image.map(|image| textures.reference(image, options)).transpose()?.flatten();
         for &is_patch in kinds {

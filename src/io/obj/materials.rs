@@ -15,7 +15,7 @@ use crate::io::input::Input;
 use crate::io::names::Materials;
 use crate::io::numbers::parse_number;
 use crate::io::words::{Dialect, Words};
-use crate::mesh::{Material, OtherMaps, Texture};
+use crate::mesh::{Maps, Material, OtherMaps, Texture};
 use crate::store::Scratch;
 
 /// The most names of libraries in one file, and the most files that they lead to.
@@ -158,6 +158,7 @@ impl Library {
                 roughness: number("Pr"),
                 alpha_cutoff: None,
                 texture: material.diffuse_texture.map(|name| self.texture(path, name)),
+                maps: Maps::default(),
                 other_maps: maps,
                 name: material.name,
             };
