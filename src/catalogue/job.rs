@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::catalogue::beside::SideFile;
 use crate::catalogue::options::Pages;
 use crate::catalogue::stamp::Stamped;
 use crate::io::Format;
@@ -67,6 +68,10 @@ pub struct Job {
     pub max_disk_bytes: Option<u64>,
     /// Folder for the work folder of the model.
     pub work_dir: RawPath,
+    /// Where the model goes if it is copied; nowhere where a copy would be no result.
+    pub as_is: Option<RawPath>,
+    /// Files of an earlier result beside the output, which may be replaced.
+    pub replaces: Vec<RawPath>,
     /// What of it is drawn.
     pub drawing: Drawing,
 }
@@ -111,6 +116,8 @@ pub struct Ending {
     pub made: Made,
     /// The input as it was read, if it could be.
     pub input: Option<Stamped>,
+    /// The files that it names, if they could be found.
+    pub beside: Option<Vec<SideFile>>,
     /// Peak resident memory of the worker, where the kernel tells it.
     pub peak_bytes: Option<u64>,
     /// Processor time of the worker, seconds.
@@ -127,12 +134,14 @@ pub enum Made {
     Repaired {
         /// What came of it.
         figures: Box<Figures>,
-        /// The files that were put in place.
+        /// The files that were put in place, the model first.
         files: Vec<OutputFile>,
+        /// Why it was not copied although nothing is wrong with it, or that was not looked at.
+        not_copied: Option<String>,
     },
     /// Nothing is wrong with the model, so it was copied.
     Copied {
-        /// The files that were put in place.
+        /// The files that were put in place, the model first.
         files: Vec<OutputFile>,
     },
     /// There is no result.

@@ -89,7 +89,11 @@ fn draw(job: &Job, made: &Made, monitor: &dyn Monitor) {
             return;
         }
     };
-    let (input, output) = (job.input.to_path(), job.output.to_path());
+    let output = match made {
+        Made::Copied { files } => files.first().map(|file| file.path.to_path()),
+        _ => None,
+    };
+    let (input, output) = (job.input.to_path(), output.unwrap_or_else(|| job.output.to_path()));
     let model = ModelPage {
         name: &drawing.name,
         input: &input,
