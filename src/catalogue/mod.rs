@@ -34,7 +34,10 @@ pub use child::WORKER;
 pub use copy::{Copied, CopyRequest, copy_if_sound};
 pub use error::CatalogueError;
 pub use fleet::{Ahead, Ended, Fleet};
-pub use job::{Drawing, Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Report, Task};
+pub use job::{
+    Drawing, Ending, Figures, Job, MOST_PARTS, Made, OutputFile, PartLine, Predicted, RawPath,
+    Report, Task,
+};
 pub use journal::{
     AttemptRow, CauseGroup, FOLDER, Failure, JOURNAL, Journal, ListOrder, ListedModel, ModelRow,
     OutcomeSum, StateCount, Summary, Told, ToldBeside, Totals, UnderWay,

@@ -107,7 +107,7 @@ impl Asking<'_> {
             now_ms: &|| self.fleet.now_ms(),
             deadline_ms: Some(self.fleet.now_ms().saturating_add(limit_ms)),
             stops: self.stops,
-            working: &|_, _| {},
+            working: &|_, _, _| {},
             note: &|text| self.fleet.note(text),
         };
         let mut asked = match worker.take() {

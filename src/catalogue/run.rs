@@ -395,7 +395,7 @@ fn watch_over(
         now_ms: &|| fleet.now_ms(),
         deadline_ms: options.model_timeout_ms.map(|ms| attempt.started_ms.saturating_add(ms)),
         stops: &|| stops.load(Ordering::Relaxed),
-        working: &|stage, share| fleet.working(slot, stage, share),
+        working: &|stage, share, bytes| fleet.working(slot, stage, share, bytes),
         note: &|text| fleet.note(text),
     };
     let exited = Worker::start(&options.program).map(|worker| worker.ask_last(job, &watch));

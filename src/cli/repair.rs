@@ -366,6 +366,7 @@ fn write_page(
         input: &arguments.input,
         output: &arguments.output,
         outcome,
+        parts: None,
         back: None,
     };
     let options = PageOptions::large(arguments.resources.max_memory / 6);
