@@ -168,7 +168,7 @@ mod tests {
             .collect();
         assert_eq!(of_interest, expected);
         assert!(named.files.contains_key(Path::new("y.mtl")), "it may come to be");
-        assert_eq!(named.outside.as_deref(), Some("../out.png"));
+        assert_eq!(named.outside.as_deref(), Some("mtl/../out.png"), "as it is followed first");
     }
 
     #[test]
