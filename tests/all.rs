@@ -5,6 +5,7 @@ mod support;
 
 mod attributes;
 mod batch;
+mod beside;
 mod cli;
 mod corners;
 mod crash;

@@ -110,6 +110,24 @@ fn models_in(summary: &serde_json::Value, key: &str, word: &str) -> u64 {
 }
 
 #[test]
+fn the_page_of_a_model_whose_parts_were_kept_apart_lists_them() {
+    let library = Library { folder: tempfile::tempdir().expect("a temporary folder") };
+    // The second part is a sheet, at which a person should look.
+    let mut text = obj_of(&cuboid([0.0; 3], [1.0, 1.0, 0.5]));
+    text.push_str("o leg & foot\nv 0 0 2\nv 1 0 2\nv 0 1 2\nf -3 -2 -1\n");
+    library.write("table.obj".as_ref(), &text);
+    assert_eq!(library.batch(&["--parts", "separate"]), 0);
+    let page = library.results().join(".brickmend/report/models/1.html");
+    let text = std::fs::read_to_string(page).expect("a page");
+    let list = text.split_once("id=\"parts\"").expect("a list of parts").1;
+    let list = list.split_once("</section>").expect("it ends").0;
+    let at = |word: &str| list.find(word).unwrap_or_else(|| panic!("{word}: {list}"));
+    assert!(at("leg &amp; foot") < at("&lt;part&gt;"), "what is worth a look first: {list}");
+    assert!(at("is-review") < at("is-pass"), "{list}");
+    assert!(!text.contains("<part>"), "names become no markup");
+}
+
+#[test]
 fn the_page_of_a_catalogue_tells_what_the_journal_knows() {
     let library = Library::hostile();
     assert_eq!(library.batch(&[]), 3, "one model is none");

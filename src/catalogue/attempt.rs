@@ -142,6 +142,8 @@ impl Place {
             threads: grant.threads,
             max_disk_bytes: self.max_disk_bytes,
             work_dir: RawPath::new(folder),
+            as_is: None,
+            replaces: Vec::new(),
             drawing: Drawing {
                 wanted: self.pages,
                 report: RawPath::new(&self.report),
@@ -151,7 +153,8 @@ impl Place {
         }
     }
 
-    /// The job of an attempt at a model.
+    /// The job of an attempt at a model; `earlier` are the files of its last result, within the
+    /// folder of the results.
     ///
     /// # Errors
     /// A folder cannot be made.
@@ -160,6 +163,7 @@ impl Place {
         row: &ModelRow,
         wanted: &Wanted,
         rung: Rung,
+        earlier: &[PathBuf],
     ) -> Result<Job, CatalogueError> {
         let folder = self.folder_of(row.id)?;
         if let Some(parent) = self.target.join(&row.output).parent() {
@@ -167,7 +171,11 @@ impl Place {
         }
         let task = if wanted.only_broken { Task::RepairBroken } else { Task::Repair };
         let settings = coarser(&wanted.settings, row, rung.coarser_levels());
-        Ok(Job { task, ..self.job(row, &settings, &folder, self.grant(rung)) })
+        let as_is = as_is(row, wanted).map(|result| RawPath::new(&self.target.join(result)));
+        let beside = earlier.iter().filter(|file| **file != row.output);
+        let replaces = beside.map(|file| RawPath::new(&self.target.join(file))).collect();
+        let job = self.job(row, &settings, &folder, self.grant(rung));
+        Ok(Job { task, as_is, replaces, ..job })
     }
 }
 
@@ -181,6 +189,17 @@ fn work_folder(options: &BatchOptions, own: &Path) -> Result<PathBuf, CatalogueE
     digester.update(real.as_os_str().as_bytes());
     let name: String = digester.digest().iter().map(|byte| format!("{byte:02x}")).collect();
     Ok(named.join(format!("brickmend-batch-{name}")))
+}
+
+/// Where a copy of the model as it is would be its result, within the folder of the results: JSON is
+/// not written, but may be copied.
+fn as_is(row: &ModelRow, wanted: &Wanted) -> Option<PathBuf> {
+    let extension = row.relative.extension()?;
+    if row.output.extension() == Some(extension) {
+        return Some(row.output.clone());
+    }
+    let is_json = wanted.format.is_none() && extension.eq_ignore_ascii_case("gltf");
+    is_json.then(|| row.relative.clone())
 }
 
 fn make_folder(folder: PathBuf) -> Result<PathBuf, CatalogueError> {

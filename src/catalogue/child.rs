@@ -62,8 +62,8 @@ pub struct Watch<'w> {
     pub deadline_ms: Option<u64>,
     /// Whether the batch stops.
     pub stops: &'w (dyn Fn() -> bool + Sync),
-    /// Hears where it is.
-    pub working: &'w (dyn Fn(Stage, f64) + Sync),
+    /// Hears where it is, and what memory it takes.
+    pub working: &'w (dyn Fn(Stage, f64, Option<u64>) + Sync),
     /// Hears remarks.
     pub note: &'w (dyn Fn(&str) + Sync),
 }
@@ -136,7 +136,9 @@ impl Worker {
         let mut killed_at_ms = u64::MAX;
         loop {
             match self.reports.recv_timeout(LOOK_INTERVAL) {
-                Ok(Report::Working { stage, share }) => (watch.working)(stage, share),
+                Ok(Report::Working { stage, share, resident_bytes }) => {
+                    (watch.working)(stage, share, resident_bytes);
+                }
                 Ok(Report::Note { text }) => (watch.note)(&text),
                 Ok(Report::Ended(end)) => {
                     ending = Some(*end);

@@ -39,9 +39,10 @@ pub trait Fleet: Sync {
     fn started(&self, slot: usize, model: &str) {
         let _ = (slot, model);
     }
-    /// Worker `slot` is at a stage, `share` of it done, 0..1.
-    fn working(&self, slot: usize, stage: Stage, share: f64) {
-        let _ = (slot, stage, share);
+    /// Worker `slot` is at a stage, `share` of it done, 0..1, and takes so much memory, as far as that
+    /// is known.
+    fn working(&self, slot: usize, stage: Stage, share: f64, resident_bytes: Option<u64>) {
+        let _ = (slot, stage, share, resident_bytes);
     }
     /// Worker `slot` is done. `left_seconds`: what the whole batch still takes, expected.
     fn ended(&self, slot: usize, ended: &Ended) {

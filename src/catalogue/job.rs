@@ -9,6 +9,7 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use crate::catalogue::beside::SideFile;
 use crate::catalogue::options::Pages;
 use crate::catalogue::stamp::Stamped;
 use crate::io::Format;
@@ -67,6 +68,10 @@ pub struct Job {
     pub max_disk_bytes: Option<u64>,
     /// Folder for the work folder of the model.
     pub work_dir: RawPath,
+    /// Where the model goes if it is copied; nowhere where a copy would be no result.
+    pub as_is: Option<RawPath>,
+    /// Files of an earlier result beside the output, which may be replaced.
+    pub replaces: Vec<RawPath>,
     /// What of it is drawn.
     pub drawing: Drawing,
 }
@@ -94,6 +99,8 @@ pub enum Report {
         stage: Stage,
         /// How much of it is done, 0..1.
         share: f64,
+        /// Resident memory of the worker, where the kernel tells it.
+        resident_bytes: Option<u64>,
     },
     /// A remark for the log.
     Note {
@@ -111,6 +118,8 @@ pub struct Ending {
     pub made: Made,
     /// The input as it was read, if it could be.
     pub input: Option<Stamped>,
+    /// The files that it names, if they could be found.
+    pub beside: Option<Vec<SideFile>>,
     /// Peak resident memory of the worker, where the kernel tells it.
     pub peak_bytes: Option<u64>,
     /// Processor time of the worker, seconds.
@@ -127,12 +136,14 @@ pub enum Made {
     Repaired {
         /// What came of it.
         figures: Box<Figures>,
-        /// The files that were put in place.
+        /// The files that were put in place, the model first.
         files: Vec<OutputFile>,
+        /// Why it was not copied although nothing is wrong with it, or that was not looked at.
+        not_copied: Option<String>,
     },
     /// Nothing is wrong with the model, so it was copied.
     Copied {
-        /// The files that were put in place.
+        /// The files that were put in place, the model first.
         files: Vec<OutputFile>,
     },
     /// There is no result.
@@ -210,6 +221,50 @@ pub struct Figures {
     pub volume: Option<f64>,
     /// The outcome, as JSON; that of the whole where parts were kept apart.
     pub outcome: String,
+    /// Where parts were kept apart, [`MOST_PARTS`] of them at most: what is worth a look first, then in
+    /// the order of the file.
+    pub parts: Vec<PartLine>,
+}
+
+/// The most parts that are kept of a model, for its page.
+pub const MOST_PARTS: usize = 500;
+
+/// A part that was repaired for itself.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PartLine {
+    /// Its name.
+    pub name: String,
+    /// How good its result is.
+    pub verdict: Verdict,
+    /// What a person should look at.
+    pub reasons: Vec<String>,
+    /// How often it stands in the scene.
+    pub places: u64,
+    /// Triangles of the part.
+    pub triangles_before: u64,
+    /// Triangles of its result.
+    pub triangles_after: u64,
+}
+
+impl PartLine {
+    fn of(outcome: &Outcome) -> Option<Self> {
+        let part = outcome.part.as_ref()?;
+        Some(Self {
+            name: part.name.clone(),
+            verdict: outcome.verdict,
+            reasons: outcome.reasons.clone(),
+            places: part.places,
+            triangles_before: outcome.input.stats.triangles,
+            triangles_after: outcome.output.proof.triangles,
+        })
+    }
+
+    /// Adds a part behind those that are as much worth a look; the last gives way.
+    fn enter(self, parts: &mut Vec<Self>) {
+        let at = parts.partition_point(|other| other.verdict >= self.verdict);
+        parts.insert(at, self);
+        parts.truncate(MOST_PARTS);
+    }
 }
 
 impl Figures {
@@ -228,6 +283,7 @@ impl Figures {
             area_ratio: Some(outcome.output.area_ratio),
             volume: Some(outcome.output.proof.volume),
             outcome: serde_json::to_string(outcome).expect("plain records serialise"),
+            parts: PartLine::of(outcome).into_iter().collect(),
         }
     }
 }
@@ -238,7 +294,10 @@ impl Figures {
     pub(crate) fn add_part(sum: Option<Self>, outcome: &Outcome) -> Self {
         let part = Self::of(outcome);
         let Some(sum) = sum else { return Self { outcome: String::new(), ..part } };
+        let mut parts = sum.parts;
+        part.parts.into_iter().for_each(|line| line.enter(&mut parts));
         Self {
+            parts,
             verdict: sum.verdict.max(part.verdict),
             reasons: sum.reasons,
             depth: sum.depth.max(part.depth),

@@ -10,8 +10,10 @@
 //! Source:     ours; the habits of restic (idempotent runs, exit 3) and of make.
 
 mod attempt;
+mod beside;
 mod child;
 mod copy;
+mod copy_files;
 mod error;
 mod fleet;
 mod job;
@@ -27,14 +29,18 @@ mod state;
 mod walk;
 mod worker;
 
+pub use beside::SideFile;
 pub use child::WORKER;
-pub use copy::copy_if_sound;
+pub use copy::{Copied, CopyRequest, copy_if_sound};
 pub use error::CatalogueError;
 pub use fleet::{Ahead, Ended, Fleet};
-pub use job::{Drawing, Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Report, Task};
+pub use job::{
+    Drawing, Ending, Figures, Job, MOST_PARTS, Made, OutputFile, PartLine, Predicted, RawPath,
+    Report, Task,
+};
 pub use journal::{
     AttemptRow, CauseGroup, FOLDER, Failure, JOURNAL, Journal, ListOrder, ListedModel, ModelRow,
-    OutcomeSum, StateCount, Summary, Told, Totals, UnderWay,
+    OutcomeSum, StateCount, Summary, Told, ToldBeside, Totals, UnderWay,
 };
 pub use options::{BatchOptions, Pages, Retry, Wanted};
 pub use run::RunEnding;

@@ -9,7 +9,7 @@ pub struct Pace {
     workers: f64,
     /// Predicted for what is not finished.
     left_seconds: f64,
-    /// Predicted for what was repaired, and what that took.
+    /// Predicted for what has a result now, and what that took.
     predicted_seconds: f64,
     actual_seconds: f64,
 }
@@ -27,7 +27,8 @@ impl Pace {
         if state != State::Pending {
             self.left_seconds = (self.left_seconds - predicted).max(0.0);
         }
-        if matches!(state, State::Repaired | State::Degraded) {
+        // Of a library of small sound models, what starting a worker takes is most of it.
+        if state.has_result() {
             self.predicted_seconds += predicted;
             self.actual_seconds += seconds;
         }

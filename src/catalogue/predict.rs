@@ -10,9 +10,10 @@ use crossbeam::channel::{Receiver, Sender, bounded, unbounded};
 
 use crate::catalogue::CatalogueError;
 use crate::catalogue::attempt::Place;
+use crate::catalogue::beside::SideFile;
 use crate::catalogue::child::{Watch, Worker};
 use crate::catalogue::fleet::Fleet;
-use crate::catalogue::job::{Job, Made, Task};
+use crate::catalogue::job::{Ending, Job, Made, Task};
 use crate::catalogue::journal::{Finished, Journal, ModelRow};
 use crate::catalogue::options::BatchOptions;
 use crate::catalogue::state::{Cause, State};
@@ -59,8 +60,8 @@ pub fn predict(
                 }
             }
             let Ok(answer) = answered.recv() else { return Ok::<(), CatalogueError>(()) };
-            let (id, made) = answer?;
-            enter(journal, id, &made, fleet)?;
+            let (row, ending) = answer?;
+            enter(journal, &row, ending, fleet)?;
             done += 1;
             fleet.looking(done, ids.len() as u64);
         }
@@ -69,7 +70,7 @@ pub fn predict(
     if fleet.cancelled() { Err(StoreError::Cancelled.into()) } else { Ok(()) }
 }
 
-type Answer = Result<(i64, Option<Made>), CatalogueError>;
+type Answer = Result<(ModelRow, Option<Ending>), CatalogueError>;
 
 /// One worker after another that is asked.
 struct Asking<'a> {
@@ -84,7 +85,7 @@ impl Asking<'_> {
     fn ask_all(&self, questions: &Receiver<ModelRow>, answers: &Sender<Answer>) {
         let mut worker = None;
         for row in questions {
-            let answer = self.ask(&mut worker, &row).map(|made| (row.id, made));
+            let answer = self.ask(&mut worker, &row).map(|ending| (row, ending));
             if answers.send(answer).is_err() {
                 return;
             }
@@ -96,7 +97,7 @@ impl Asking<'_> {
         &self,
         worker: &mut Option<Worker>,
         row: &ModelRow,
-    ) -> Result<Option<Made>, CatalogueError> {
+    ) -> Result<Option<Ending>, CatalogueError> {
         let wanted = (self.options.wanted)(&row.relative);
         let folder = self.place.folder_of_slot(self.slot)?;
         let job = self.place.job(row, &wanted.settings, &folder, self.place.shared());
@@ -106,7 +107,7 @@ impl Asking<'_> {
             now_ms: &|| self.fleet.now_ms(),
             deadline_ms: Some(self.fleet.now_ms().saturating_add(limit_ms)),
             stops: self.stops,
-            working: &|_, _| {},
+            working: &|_, _, _| {},
             note: &|text| self.fleet.note(text),
         };
         let mut asked = match worker.take() {
@@ -117,26 +118,28 @@ impl Asking<'_> {
         // One that was stopped, or ended, is of no more use.
         let is_whole = ending.as_ref().is_some_and(|ending| !ending.made.is_stopped());
         *worker = is_whole.then_some(asked);
-        Ok(ending.map(|ending| ending.made))
+        Ok(ending)
     }
 }
 
 fn enter(
     journal: &mut Journal,
-    id: i64,
-    made: &Option<Made>,
+    row: &ModelRow,
+    ending: Option<Ending>,
     fleet: &dyn Fleet,
 ) -> Result<(), CatalogueError> {
+    let Some(Ending { made, beside, .. }) = ending else { return Ok(()) };
     match made {
-        Some(Made::Estimate(predicted)) => journal.predict(id, predicted),
-        Some(Made::Nothing { blame, message, .. }) if Cause::from(*blame) == Cause::Input => {
+        Made::Estimate(predicted) => journal.predict(row.id, &predicted),
+        Made::Nothing { blame, message, .. } if Cause::from(blame) == Cause::Input => {
             let finished = Finished {
                 cause: Some(Cause::Input),
-                reason: Some(message.clone()),
+                reason: Some(message),
+                beside: beside.map(|files| SideFile::within(files, &row.relative)),
                 now_ms: fleet.now_ms(),
                 ..Finished::default()
             };
-            journal.finish(id, State::Failed, &finished)
+            journal.finish(row.id, State::Failed, &finished)
         }
         // The repair will tell.
         _ => Ok(()),

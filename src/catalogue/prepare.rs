@@ -2,8 +2,9 @@
 //!
 //! In:         the folder of the models, the journal, the results.
 //! Out:        the journal: models to be done are pending.
-//! Invariant:  a model is settled only if its content, its settings, the version of the program and
-//!             the files of its result are what they were when it was done. What the file system
+//! Invariant:  a model is settled only if its content and that of the files which it names, its
+//!             settings, the version of the program and the files of its result are what they were
+//!             when it was done. What the file system
 //!             says of a file is believed where it says that nothing changed, and nowhere else.
 //! Memory:     numbers of models.
 //! Fails:      [`CatalogueError`].
@@ -12,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 use crate::catalogue::CatalogueError;
 use crate::catalogue::fleet::Fleet;
-use crate::catalogue::journal::{Enrolled, Journal, Seen};
+use crate::catalogue::journal::{Enrolled, Journal, Seen, SideRow};
 use crate::catalogue::names::{result_format, wished_name};
 use crate::catalogue::options::{BatchOptions, Wanted};
 use crate::catalogue::stamp::{Stamp, Stamped};
@@ -20,6 +21,8 @@ use crate::catalogue::walk::{Found, PassedBy, walk, walk_listed};
 use crate::io::Format;
 use crate::store::{Digest, Digester, FORMAT_VERSION, StoreError};
 
+/// Files beside models that are looked at in one go.
+const SIDE_FILES_AT_ONCE: u32 = 1024;
 /// How often the caller hears of the progress.
 const TOLD_EVERY: usize = 256;
 
@@ -73,6 +76,7 @@ pub fn prepare(
         journal.ask_anew_where(run, &condition)?;
     }
     check_inputs(journal, &enrolled.touched, options, fleet)?;
+    check_beside(journal, run, options, fleet)?;
     check_results(journal, run, options, fleet)?;
     Ok(Prepared { found, passed, enrolled })
 }
@@ -119,7 +123,52 @@ fn check_inputs(
             }
         }
     }
-    journal.ask_anew(&changed)
+    journal.ask_anew(&changed, "the model changed")
+}
+
+/// Asks anew for models that name a file which is not what it was. The list is that of the journal:
+/// no model is read for it.
+fn check_beside(
+    journal: &mut Journal,
+    run: i64,
+    options: &BatchOptions,
+    fleet: &dyn Fleet,
+) -> Result<(), CatalogueError> {
+    let mut last = SideRow::default();
+    // Many models may name one file: it is read once.
+    let mut read: Option<(PathBuf, Option<Stamped>)> = None;
+    loop {
+        let rows = journal.side_files_after(run, &last, SIDE_FILES_AT_ONCE)?;
+        let Some(end) = rows.last() else { return Ok(()) };
+        last = end.clone();
+        for SideRow { model, path: relative, then } in rows {
+            if fleet.cancelled() {
+                return Err(StoreError::Cancelled.into());
+            }
+            let path = options.source.join(&relative);
+            let stamp = Stamp::at(&path);
+            if stamp == then.map(|then| then.stamp) && !(options.rehash && then.is_some()) {
+                continue;
+            }
+            let now = match &read {
+                Some((known, now)) if *known == path => *now,
+                _ => stamp.map(|_| read_again(&path, fleet)).transpose()?.flatten(),
+            };
+            read = Some((path, now));
+            let what = match (then, now) {
+                (Some(then), Some(now)) if then.digest == now.digest => {
+                    journal.set_side_stamp(model, &relative, &now.stamp)?;
+                    continue;
+                }
+                (None, None) => continue,
+                (Some(_), Some(_)) => "changed",
+                (Some(_), None) => "is gone",
+                (None, Some(_)) => "is there now",
+            };
+            let because = format!("its file {} {what}", relative.to_string_lossy());
+            journal.ask_anew(&[model], &because)?;
+        }
+    }
 }
 
 /// Asks anew for models whose result is not what was put in place.
@@ -130,7 +179,7 @@ fn check_results(
     fleet: &dyn Fleet,
 ) -> Result<(), CatalogueError> {
     let ids = journal.with_results(run)?;
-    let mut lost = Vec::new();
+    let (mut lost, mut changed) = (Vec::new(), Vec::new());
     for (done, &id) in ids.iter().enumerate() {
         if done % TOLD_EVERY == 0 {
             fleet.looking(done as u64, ids.len() as u64);
@@ -143,11 +192,14 @@ fn check_results(
         for (file, put) in files {
             is_there = is_there && is_still(journal, id, &file, &put, options, fleet)?;
         }
-        if !is_there || options.rehash && !is_input_still(journal, id, options, fleet)? {
+        if !is_there {
             lost.push(id);
+        } else if options.rehash && !is_input_still(journal, id, options, fleet)? {
+            changed.push(id);
         }
     }
-    journal.ask_anew(&lost)
+    journal.ask_anew(&lost, "a file of its result is not what was put there")?;
+    journal.ask_anew(&changed, "the model changed")
 }
 
 fn is_still(

@@ -16,13 +16,16 @@ use crossbeam::channel::{RecvTimeoutError, Sender, unbounded};
 
 use crate::catalogue::CatalogueError;
 use crate::catalogue::attempt::{Meaning, Place, meaning};
+use crate::catalogue::beside::SideFile;
 use crate::catalogue::child::{Exited, Watch, Worker};
 use crate::catalogue::fleet::{Ended, Fleet};
 use crate::catalogue::job::{Job, Made, OutputFile, RawPath};
 use crate::catalogue::journal::{Finished, Journal, ModelRow};
 use crate::catalogue::options::BatchOptions;
 use crate::catalogue::pace::Pace;
+use crate::catalogue::stamp::Stamp;
 use crate::catalogue::state::{Cause, Rung, State};
+use crate::store::StoreError;
 
 /// How often limits are looked at while nothing happens.
 const LOOK_INTERVAL: Duration = Duration::from_millis(200);
@@ -203,7 +206,9 @@ impl<'b> Workload<'b> {
     ) -> Result<(Attempt, Job), CatalogueError> {
         let row = self.journal.model(id)?;
         let wanted = (self.options.wanted)(&row.relative);
-        let job = self.place.attempt(&row, &wanted, rung)?;
+        let earlier: Vec<PathBuf> =
+            self.journal.files(id)?.into_iter().map(|(file, _)| file).collect();
+        let job = self.place.attempt(&row, &wanted, rung, &earlier)?;
         let grant = self.place.grant(rung);
         let started_ms = self.fleet.now_ms();
         let number = self.journal.begin_attempt(
@@ -241,8 +246,11 @@ impl<'b> Workload<'b> {
         let now_ms = self.fleet.now_ms();
         let seconds = now_ms.saturating_sub(attempt.started_ms) as f64 / 1000.0;
         let meaning = meaning(exited);
+        let ending = exited.ending.as_mut();
+        let beside = ending.and_then(|ending| ending.beside.take());
         let ending = exited.ending.as_ref();
         let finished = Finished {
+            beside: beside.map(|files| SideFile::within(files, &attempt.row.relative)),
             input: ending.and_then(|ending| ending.input),
             now_ms,
             seconds,
@@ -272,12 +280,13 @@ impl<'b> Workload<'b> {
         made: &Made,
         finished: Finished,
     ) -> Result<(), CatalogueError> {
-        let (state, figures, files) = match made {
-            Made::Repaired { figures, files } if attempt.rung.coarser_levels() > 0 => {
-                (State::Degraded, Some(&**figures), files)
+        let (state, figures, files, not_copied) = match made {
+            Made::Repaired { figures, files, not_copied } => {
+                let is_coarser = attempt.rung.coarser_levels() > 0;
+                let state = if is_coarser { State::Degraded } else { State::Repaired };
+                (state, Some(&**figures), files, not_copied.as_ref())
             }
-            Made::Repaired { figures, files } => (State::Repaired, Some(&**figures), files),
-            Made::Copied { files } => (State::Copied, None, files),
+            Made::Copied { files } => (State::Copied, None, files, None),
             // A worker that answers what it was not asked.
             Made::Estimate(_) | Made::Nothing { .. } => {
                 let reason = "the worker answered something else".to_owned();
@@ -285,7 +294,11 @@ impl<'b> Workload<'b> {
             }
         };
         let files: Vec<OutputFile> = files.iter().map(|file| self.within(file)).collect();
-        let reason = figures.map(|figures| figures.reasons.join("; ")).filter(|r| !r.is_empty());
+        let reasons = figures.into_iter().flat_map(|figures| &figures.reasons);
+        let reasons: Vec<&str> =
+            not_copied.into_iter().chain(reasons).map(String::as_str).collect();
+        let reason = (!reasons.is_empty()).then(|| reasons.join("; "));
+        self.remove_earlier(attempt.row.id, &files)?;
         let finished = Finished { figures, files: &files, reason, ..finished };
         self.journal.finish(attempt.row.id, state, &finished)?;
         let (now_ms, seconds) = (finished.now_ms, finished.seconds);
@@ -347,6 +360,21 @@ impl<'b> Workload<'b> {
         OutputFile { path: RawPath::new(&within), stamped: file.stamped }
     }
 
+    /// Removes what an earlier result had and this one has not, as far as it is still as it was put
+    /// there and no part of the result of another model.
+    fn remove_earlier(&mut self, model: i64, files: &[OutputFile]) -> Result<(), CatalogueError> {
+        for (file, put) in self.journal.files(model)? {
+            let path = self.options.target.join(&file);
+            if files.iter().all(|now| now.path.to_path() != file)
+                && Stamp::at(&path) == Some(put.stamp)
+                && !self.journal.is_file_of_another(model, &file)?
+            {
+                std::fs::remove_file(&path).map_err(|e| StoreError::io("remove", &path, e))?;
+            }
+        }
+        Ok(())
+    }
+
     /// What is left of a model's work is of no use; that it cannot be removed changes nothing.
     fn remove_work(&self, model: i64) {
         let _ = std::fs::remove_dir_all(self.place.work().join(model.to_string()));
@@ -367,7 +395,7 @@ fn watch_over(
         now_ms: &|| fleet.now_ms(),
         deadline_ms: options.model_timeout_ms.map(|ms| attempt.started_ms.saturating_add(ms)),
         stops: &|| stops.load(Ordering::Relaxed),
-        working: &|stage, share| fleet.working(slot, stage, share),
+        working: &|stage, share, bytes| fleet.working(slot, stage, share, bytes),
         note: &|text| fleet.note(text),
     };
     let exited = Worker::start(&options.program).map(|worker| worker.ask_last(job, &watch));

@@ -7,30 +7,38 @@
 
 use std::path::{Path, PathBuf};
 
-use crate::catalogue::copy::copy_if_sound;
+use crate::catalogue::beside::{share_bytes, side_files};
+use crate::catalogue::copy::{Copied, CopyRequest, copy_if_sound};
 use crate::catalogue::job::{Ending, Figures, Job, Made, OutputFile, Predicted, RawPath, Task};
 use crate::catalogue::stamp::Stamped;
 use crate::contour::SurfaceDetail;
-use crate::io::{Format, library_name};
+use crate::io::{Format, is_image_of, library_name, named_files};
 use crate::monitor::Monitor;
 use crate::repair::{Limits, Outcome, PartsRule, RepairError, estimate, repair, repair_parts};
+use crate::store::Scratch;
 
 /// Does what `job` asks for. The caller fills in what the kernel knows of the process, `stamp` what
 /// the caller's monitor knows of a repair.
 #[must_use]
 pub fn do_job(job: &Job, monitor: &dyn Monitor, stamp: &dyn Fn(&mut Outcome)) -> Ending {
     let input_path = job.input.to_path();
-    let mut input = None;
+    let limits = limits_of(job);
+    let (mut input, mut beside) = (None, None);
     let made = match job.task {
         Task::Estimate => predict(job, &input_path, monitor),
         Task::Repair | Task::RepairBroken => {
             // Before it is read for the repair: a later change makes the stamp fit no longer.
             input = Stamped::read(&input_path, &|| monitor.cancelled()).ok();
+            beside = side_files(&input_path, &limits, monitor);
             make(job, &input_path, monitor, stamp)
         }
     };
-    let made = made.unwrap_or_else(|error| nothing(&error));
-    Ending { made, input, peak_bytes: None, cpu_seconds: 0.0 }
+    let made = made.unwrap_or_else(|error| {
+        // What is missing beside a model may be why it cannot be read.
+        beside = beside.take().or_else(|| side_files(&input_path, &limits, monitor));
+        nothing(&error)
+    });
+    Ending { made, input, beside, peak_bytes: None, cpu_seconds: 0.0 }
 }
 
 fn limits_of(job: &Job) -> Limits {
@@ -39,6 +47,7 @@ fn limits_of(job: &Job) -> Limits {
         threads: job.threads,
         max_disk_bytes: job.max_disk_bytes,
         work_dir: Some(job.work_dir.to_path()),
+        replaces: job.replaces.iter().map(RawPath::to_path).collect(),
         ..Limits::default()
     }
 }
@@ -56,18 +65,24 @@ fn make(
     stamp: &dyn Fn(&mut Outcome),
 ) -> Result<Made, RepairError> {
     let (output, limits) = (job.output.to_path(), limits_of(job));
-    if job.task == Task::RepairBroken
-        && copy_if_sound(input, &output, job.format, &limits, monitor)?
-    {
-        return Ok(Made::Copied { files: known_again(&[output])? });
+    let mut not_copied = None;
+    if job.task == Task::RepairBroken {
+        let copy = job.as_is.as_ref().map(RawPath::to_path);
+        let (output, limits) = (copy.as_deref(), &limits);
+        let request = CopyRequest { input, output, limits, is_one_of_many: true };
+        match copy_if_sound(&request, monitor)? {
+            Copied::Done(files) => return Ok(Made::Copied { files: known_again(&files)? }),
+            Copied::NotSound => {}
+            Copied::Not(reason) => not_copied = reason,
+        }
     }
     if job.settings.parts == PartsRule::Separate {
-        return make_parts(job, input, (&output, &limits), monitor);
+        return make_parts(job, input, (&output, &limits), not_copied, monitor);
     }
     let mut outcome = repair(input, &output, job.format, &job.settings, &limits, monitor)?;
     stamp(&mut outcome);
-    let files = known_again(&files_of(&output, job.format, has_surfaces(&outcome)))?;
-    Ok(Made::Repaired { figures: Box::new(Figures::of(&outcome)), files })
+    let files = known_again(&files_of(&output, job.format, Beside::of(&outcome), &limits)?)?;
+    Ok(Made::Repaired { figures: Box::new(Figures::of(&outcome)), files, not_copied })
 }
 
 /// Repairs the parts of a model, each for itself.
@@ -75,32 +90,63 @@ fn make_parts(
     job: &Job,
     input: &Path,
     (output, limits): (&Path, &Limits),
+    not_copied: Option<String>,
     monitor: &dyn Monitor,
 ) -> Result<Made, RepairError> {
-    let (mut sum, mut has_library) = (None, false);
+    let (mut sum, mut beside) = (None, Beside::default());
     let mut deliver = |outcome: Outcome| {
-        has_library |= has_surfaces(&outcome);
+        beside = beside.with(Beside::of(&outcome));
         sum = Some(Figures::add_part(sum.take(), &outcome));
     };
     let (format, settings) = (job.format, &job.settings);
     let whole = repair_parts(input, output, format, settings, limits, monitor, &mut deliver)?;
     let sum = sum.expect("a file has a part at least");
-    let files = known_again(&files_of(output, job.format, has_library))?;
-    Ok(Made::Repaired { figures: Box::new(Figures::close_parts(sum, &whole)), files })
+    let files = known_again(&files_of(output, job.format, beside, limits)?)?;
+    Ok(Made::Repaired { figures: Box::new(Figures::close_parts(sum, &whole)), files, not_copied })
 }
 
-fn has_surfaces(outcome: &Outcome) -> bool {
-    outcome.transfer.surfaces != SurfaceDetail::None
+/// What may lie beside a result.
+#[derive(Clone, Copy, Default)]
+struct Beside {
+    has_library: bool,
+    has_images: bool,
 }
 
-/// The files of a result: beside an OBJ file lies its library.
-fn files_of(output: &Path, format: Format, has_library: bool) -> Vec<PathBuf> {
-    let mut files = vec![output.to_path_buf()];
-    let library = output.with_file_name(library_name(output));
-    if format == Format::Obj && has_library {
-        files.push(library);
+impl Beside {
+    fn of(outcome: &Outcome) -> Self {
+        let has_library = outcome.transfer.surfaces != SurfaceDetail::None;
+        Self { has_library, has_images: has_library && outcome.transfer.attributes.uvs }
     }
-    files
+
+    fn with(self, other: Self) -> Self {
+        Self {
+            has_library: self.has_library || other.has_library,
+            has_images: self.has_images || other.has_images,
+        }
+    }
+}
+
+/// The files of a result, the model first: the library of an OBJ file, and the images beside it that
+/// are its own.
+fn files_of(
+    output: &Path,
+    format: Format,
+    beside: Beside,
+    limits: &Limits,
+) -> Result<Vec<PathBuf>, RepairError> {
+    let mut files = vec![output.to_path_buf()];
+    if format == Format::Obj && beside.has_library {
+        files.push(output.with_file_name(library_name(output)));
+    }
+    if matches!(format, Format::Obj | Format::Ply) && beside.has_images {
+        let scratch = Scratch::new(limits.work_dir.as_deref().unwrap_or(Path::new(".")));
+        let named = named_files(output, &scratch, share_bytes(limits));
+        let named = named.map_err(RepairError::ReadBack)?;
+        let there = named.files.into_iter().filter(|(_, is_there)| *is_there);
+        let there = there.map(|(way, _)| output.with_file_name(way));
+        files.extend(there.filter(|path| is_image_of(output, path)));
+    }
+    Ok(files)
 }
 
 /// What was put in place is known again by this; stopping now would lose it.

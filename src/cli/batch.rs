@@ -8,7 +8,7 @@ use std::process::ExitCode;
 
 use brickmend::catalogue::{
     BatchOptions, BatchReport, CatalogueError, Cause, Fleet, Pages, Retry, RunEnding, Selection,
-    Summary, Wanted, run_batch,
+    State, Summary, Wanted, run_batch,
 };
 use brickmend::io::Format;
 use brickmend::repair::{Blame, Settings, TextureRule};
@@ -25,7 +25,7 @@ use crate::cli::fleet::Terminal;
 use crate::cli::progress::{Chatter, on_one_line};
 use crate::cli::report;
 use crate::cli::signals::Stop;
-use crate::cli::time::{next_at, parse_clock, parse_time};
+use crate::cli::time::{approximately, next_at, parse_clock, parse_time};
 
 const EXIT_STATUS: &str = "\
 Exit status:
@@ -298,10 +298,16 @@ pub fn text_of(summary: &Summary) -> String {
     for count in &summary.states {
         let more = count.verdict.iter().chain(&count.cause).map(|word| format!(", {word}"));
         let more: String = more.collect();
-        text.push_str(&format!(
-            "\n  {:7} {}{more} ({:.1} s)",
-            count.models, count.state, count.seconds
-        ));
+        text.push_str(&format!("\n  {:7} {}{more}", count.models, count.state));
+        let is_pending = count.state == State::Pending.name();
+        // What is still to be done took no time yet.
+        match (is_pending, summary.pending_seconds) {
+            (false, _) => text.push_str(&format!(" ({:.1} s)", count.seconds)),
+            (true, seconds) if seconds > 0.0 => {
+                text.push_str(&format!(" (about {} on one worker)", approximately(seconds)));
+            }
+            (true, _) => {}
+        }
     }
     for work in &summary.under_way {
         text.push_str(&format!("\n  at work: {} ({})", on_one_line(&work.name), work.rung));
@@ -312,6 +318,7 @@ pub fn text_of(summary: &Summary) -> String {
     }
     text
 }
+
 /// The settings of a batch: its results stand on their own, with copies of their images.
 fn settings_of(arguments: &ResultArguments) -> Settings {
     let settings = arguments.settings();

@@ -4,11 +4,12 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use brickmend::catalogue::{Copied, CopyRequest, copy_if_sound};
 use brickmend::io::{Format, ReadOptions, format_of_extension};
 use brickmend::monitor::Void;
 use brickmend::repair::{
-    Levels, Limits, Outcome, PartsOutcome, PartsRule, RepairError, Settings, Verdict, repair,
-    repair_levels, repair_parts,
+    Levels, Limits, Outcome, PartsOutcome, PartsRule, RepairError, SCHEMA_VERSION, Settings,
+    Verdict, repair, repair_levels, repair_parts,
 };
 use brickmend::report::{
     ModelPage, OpenSource, PageOptions, PreviewOptions, ReportError, write_model_page,
@@ -34,6 +35,10 @@ pub struct RepairArguments {
     output: PathBuf,
     #[command(flatten)]
     result: ResultArguments,
+    /// Copy a model with which nothing is wrong byte for byte, with the files that it names, if it is
+    /// of the format of the output.
+    #[arg(long, conflicts_with = "lod", help_heading = "Result")]
+    only_broken: bool,
     /// Levels of detail: one file for each of these values of --decimate, such as
     /// 0,0.1,0.5,2cells, from one run; for -o out.ply they are out.0cells.ply, out.0.1cells.ply and
     /// so on.
@@ -86,6 +91,16 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         ..arguments.resources.limits()
     };
     let (input, output) = (&arguments.input, &arguments.output);
+    if arguments.only_broken {
+        let copied = copy(arguments, &limits, &progress);
+        progress.clear();
+        match copied {
+            Ok(Copied::Done(files)) => return finish_copy(arguments, files, chatter),
+            Ok(Copied::Not(Some(reason))) => chatter.say(&on_one_line(&reason)),
+            Ok(_) => {}
+            Err(error) => return fail(&error, &stop, chatter),
+        }
+    }
     if settings.parts == PartsRule::Separate {
         return run_parts(arguments, (format, &settings, &limits), &progress, (&stop, chatter));
     }
@@ -105,6 +120,58 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         }
         Err(error) => fail(&error, &stop, chatter),
     }
+}
+
+/// Copies the model if nothing is wrong with it.
+fn copy(
+    arguments: &RepairArguments,
+    limits: &Limits,
+    progress: &Progress,
+) -> Result<Copied, RepairError> {
+    let (input, output) = (&*arguments.input, &*arguments.output);
+    let real = |path: &Path| path.canonicalize().ok();
+    // The repair refuses to write over its input.
+    if real(input).is_some() && real(input) == real(output) {
+        return Ok(Copied::NotSound);
+    }
+    let request = CopyRequest { input, output: Some(output), limits, is_one_of_many: false };
+    copy_if_sound(&request, progress)
+}
+
+/// What is told of a copy; see docs/outcome.md.
+#[derive(serde::Serialize)]
+struct CopyOutcome {
+    schema: u32,
+    version: &'static str,
+    copied: bool,
+    files: Vec<String>,
+}
+
+/// Tells that the model was copied, draws the preview.
+fn finish_copy(arguments: &RepairArguments, files: Vec<PathBuf>, chatter: &Chatter) -> ExitCode {
+    let mut exit = draw_preview(arguments, chatter).unwrap_or(Exit::Success);
+    if let Some(path) = &arguments.report
+        && let Err(error) = write_page(arguments, None, path)
+    {
+        chatter.error(&error);
+        exit = Exit::from(error.blame());
+    }
+    if arguments.json {
+        let version = env!("CARGO_PKG_VERSION");
+        let files = files.iter().map(|path| path.display().to_string()).collect();
+        let told = CopyOutcome { schema: SCHEMA_VERSION, version, copied: true, files };
+        let text = serde_json::to_string_pretty(&told).expect("plain records serialise");
+        // A reader that went away is no failure of the copy.
+        let _ = writeln!(std::io::stdout(), "{text}");
+    } else {
+        let output = on_one_line(&arguments.output.display().to_string());
+        let more = match files.len() {
+            0 | 1 => String::new(),
+            count => format!(", with {} files that it names", count - 1),
+        };
+        chatter.say(&format!("{output}: copied, since nothing is wrong with it{more}"));
+    }
+    exit.into()
 }
 
 /// Repairs the parts of a model, each for itself. Their outcomes are printed as they come.
@@ -216,7 +283,7 @@ fn finish(arguments: &RepairArguments, outcomes: &mut [Outcome], chatter: &Chatt
     }
     if let Some(path) = &arguments.report
         && let [outcome] = &*outcomes
-        && let Err(error) = write_page(arguments, outcome, path)
+        && let Err(error) = write_page(arguments, Some(outcome), path)
     {
         chatter.error(&error);
         exit = Exit::from(error.blame());
@@ -289,7 +356,7 @@ fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
 /// Writes the page of the model; a sixth of the memory budget is for pictures and meshes.
 fn write_page(
     arguments: &RepairArguments,
-    outcome: &Outcome,
+    outcome: Option<&Outcome>,
     path: &Path,
 ) -> Result<(), ReportError> {
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -298,7 +365,8 @@ fn write_page(
         name: &name,
         input: &arguments.input,
         output: &arguments.output,
-        outcome: Some(outcome),
+        outcome,
+        parts: None,
         back: None,
     };
     let options = PageOptions::large(arguments.resources.max_memory / 6);

@@ -61,6 +61,13 @@ fn text_of_model(told: &Told) -> String {
     if let Some(reason) = &told.reason {
         text.push_str(&format!("\n  {}", on_one_line(reason)));
     }
+    if let Some(because) = &told.because {
+        text.push_str(&format!("\n  asked for because: {}", on_one_line(because)));
+    }
+    for file in &told.beside {
+        let missing = if file.is_there { "" } else { ", not there" };
+        text.push_str(&format!("\n  names {}{missing}", on_one_line(&file.name)));
+    }
     for attempt in &told.attempts {
         let ending = attempt.ending.as_deref().unwrap_or("without an end");
         let mebibytes = attempt.memory_bytes >> 20;

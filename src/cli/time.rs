@@ -42,9 +42,28 @@ pub fn next_at(now: &ZonedDateTime, time: Time) -> u64 {
     u64::try_from(ms).unwrap_or(0)
 }
 
+/// So many seconds, as people say it of what is only expected.
+pub fn approximately(seconds: f64) -> String {
+    let seconds = seconds.max(0.0);
+    let minutes = (seconds / 60.0).round();
+    match (seconds, minutes) {
+        _ if !seconds.is_finite() => "a very long time".to_owned(),
+        (..100.0, _) => format!("{seconds:.0} s"),
+        (_, ..100.0) => format!("{minutes:.0} min"),
+        _ => format!("{} h {} min", (minutes / 60.0).floor(), minutes % 60.0),
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn long_times_are_said_in_larger_units() {
+        let said = [0.4, 99.4, 100.0, 5900.0, 6000.0, f64::INFINITY].map(approximately);
+        let expected = ["0 s", "99 s", "2 min", "98 min", "1 h 40 min", "a very long time"];
+        assert_eq!(said, expected);
+    }
 
     #[test]
     fn times_have_units() {

@@ -7,16 +7,16 @@ use std::process::ExitCode;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use brickmend::catalogue::{Job, Made, Pages, Report, do_job};
+use brickmend::catalogue::{Job, Made, Report, do_job};
 use brickmend::monitor::{Monitor, Stage};
-use brickmend::repair::Outcome;
-use brickmend::report::{Gallery, ModelPage};
+use brickmend::repair::{Outcome, PartsOutcome};
+use brickmend::report::{Gallery, ModelPage, PartsPage};
 use brickmend::store::Scratch;
 use clap::Args;
 use rustix::process::{Pid, Signal, getppid, set_parent_process_death_signal};
 
 use crate::cli::exit_code::Exit;
-use crate::cli::memory::{cpu_seconds, peak_resident_bytes};
+use crate::cli::memory::{cpu_seconds, peak_resident_bytes, resident_bytes};
 use crate::cli::progress::Chatter;
 use crate::cli::signals::Stop;
 use crate::cli::stage_clock::StageClock;
@@ -79,33 +79,39 @@ fn work(job: &Job, stop: Stop) {
 fn draw(job: &Job, made: &Made, monitor: &dyn Monitor) {
     let drawing = &job.drawing;
     let gallery = Gallery::new(&drawing.report.to_path(), drawing.number);
-    let outcome = match made {
-        Made::Repaired { figures, .. } => serde_json::from_str::<Outcome>(&figures.outcome).ok(),
-        Made::Copied { .. } => None,
+    let (mut outcome, mut whole, mut parts) = (None, None, &[][..]);
+    match made {
+        Made::Repaired { figures, .. } => {
+            outcome = serde_json::from_str::<Outcome>(&figures.outcome).ok();
+            if outcome.is_none() {
+                whole = serde_json::from_str::<PartsOutcome>(&figures.outcome).ok();
+                parts = &figures.parts;
+            }
+        }
+        Made::Copied { .. } => {}
         Made::Estimate(_) => return,
         // Of an earlier result.
         Made::Nothing { .. } => {
             let _ = gallery.clear();
             return;
         }
+    }
+    let output = match made {
+        Made::Copied { files } => files.first().map(|file| file.path.to_path()),
+        _ => None,
     };
-    let (input, output) = (job.input.to_path(), job.output.to_path());
+    let (input, output) = (job.input.to_path(), output.unwrap_or_else(|| job.output.to_path()));
     let model = ModelPage {
         name: &drawing.name,
         input: &input,
         output: &output,
         outcome: outcome.as_ref(),
+        parts: whole.as_ref().map(|whole| PartsPage { whole, parts }),
         back: None,
     };
     let scratch = Scratch::new(&job.work_dir.to_path());
     let share_bytes = job.max_memory_bytes / PAGE_SHARE;
-    // Of a model whose parts were kept apart there is no one outcome that a page could tell.
-    let is_told = outcome.is_some() || matches!(made, Made::Copied { .. });
-    let wanted = match drawing.wanted {
-        Pages::All if !is_told => Pages::Thumbnails,
-        wanted => wanted,
-    };
-    let drawn = gallery.write(&model, wanted, share_bytes, &scratch, monitor);
+    let drawn = gallery.write(&model, drawing.wanted, share_bytes, &scratch, monitor);
     if let Err(error) = drawn {
         let _ = gallery.clear();
         say(&Report::Note { text: format!("{}: no page of it: {error}", drawing.name) });
@@ -148,7 +154,7 @@ impl State {
         }
         self.said = Instant::now();
         if let Some((stage, share)) = self.clock.share() {
-            say(&Report::Working { stage, share });
+            say(&Report::Working { stage, share, resident_bytes: resident_bytes() });
         }
     }
 }

@@ -261,6 +261,15 @@ pub(crate) fn name_beside(output: &Path, number: u32, kind: ImageKind) -> String
     format!("{dot}{stem}.texture-{number}.{}", kind.ending())
 }
 
+/// Whether a file beside an output has the name of one of its images.
+#[must_use]
+pub fn is_image_of(output: &Path, file: &Path) -> bool {
+    let name = name_beside(output, 0, ImageKind::ALL[0]);
+    let front = name.trim_start_matches("./").rsplit_once('-').map_or("", |(front, _)| front);
+    let number = file.file_name().and_then(|name| name.to_str()?.strip_prefix(front));
+    output.parent() == file.parent() && number.is_some_and(|rest| rest.starts_with('-'))
+}
+
 /// Whether an output names images that lie elsewhere.
 pub(crate) fn refers(format: Format, attributes: Attributes) -> bool {
     attributes.uvs && matches!(format, Format::Obj | Format::Ply)

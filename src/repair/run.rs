@@ -105,7 +105,7 @@ fn run(
     let seen = InputIdentity::of(input)?;
     let key = run_key(input, format, &settings, named, &recording)?;
     let outputs: Vec<PathBuf> = levels.iter().map(|level| level.output.clone()).collect();
-    keep_libraries(format, outputs.iter())?;
+    keep_libraries(format, outputs.iter(), limits)?;
     let workspace = Workspace::open(input, output, outputs, limits, key)?;
     let accountant = Accountant::new(limits.max_memory_bytes);
     let run = Run {

@@ -252,6 +252,8 @@ pub struct Limits {
     pub checkpoint_bytes: u64,
     /// Share of every sort and table, for tests of the spilled forms; from the budget when `None`.
     pub share_bytes: Option<u64>,
+    /// Files beside the output that may be replaced whatever is in them: those of an earlier result.
+    pub replaces: Vec<PathBuf>,
     /// Where brick files lie.
     pub backing: Backing,
 }
@@ -266,6 +268,7 @@ impl Default for Limits {
             fresh: false,
             checkpoint_bytes: 16 << 20,
             share_bytes: None,
+            replaces: Vec::new(),
             backing: Backing::Mapped,
         }
     }

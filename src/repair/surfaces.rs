@@ -12,7 +12,7 @@ use crate::io::{
 use crate::repair::RepairError;
 use crate::repair::outcome::TransferReport;
 use crate::repair::run::Run;
-use crate::repair::settings::{NormalRule, TextureRule};
+use crate::repair::settings::{Limits, NormalRule, TextureRule};
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
 use crate::store::FileState;
@@ -109,7 +109,7 @@ impl Run<'_> {
         let mut options = self.write_options(workspace, findings)?;
         for level in &self.levels()[findings.finished.len()..] {
             options.output.clone_from(&level.output);
-            Beside { format: self.format, options: &options, workspace }.keep_images()?;
+            self.beside(&options, workspace).keep_images()?;
         }
         Ok(())
     }
@@ -121,7 +121,11 @@ impl Run<'_> {
         findings: &Findings,
     ) -> Result<(), RepairError> {
         let options = self.write_options(workspace, findings)?;
-        Beside { format: self.format, options: &options, workspace }.put()
+        self.beside(&options, workspace).put()
+    }
+
+    fn beside<'o>(&'o self, options: &'o WriteOptions, workspace: &'o Workspace) -> Beside<'o> {
+        Beside { format: self.format, options, workspace, replaces: &self.limits.replaces }
     }
 }
 
@@ -131,6 +135,8 @@ pub struct Beside<'o> {
     pub format: Format,
     pub options: &'o WriteOptions,
     pub workspace: &'o Workspace,
+    /// What may be replaced though it is not known to be ours.
+    pub replaces: &'o [PathBuf],
 }
 
 impl Beside<'_> {
@@ -148,7 +154,7 @@ impl Beside<'_> {
     /// # Errors
     /// [`RepairError::ForeignLibrary`], or they cannot be written.
     pub fn put(self) -> Result<(), RepairError> {
-        let Self { format, options, workspace } = self;
+        let Self { format, options, workspace, replaces } = self;
         let scratch = workspace.scratch();
         self.each_image_to_put(|image| {
             workspace.put_beside(&image.path, |part| image.write(part, scratch))
@@ -157,7 +163,7 @@ impl Beside<'_> {
             return Ok(());
         };
         let path = workspace.output_path().with_file_name(&options.library);
-        keep_foreign(&path)?;
+        keep_foreign(&path, replaces)?;
         workspace.put_beside(&path, |part| write_library(part, palette, options, scratch))
     }
 
@@ -171,7 +177,8 @@ impl Beside<'_> {
             if image.is_there().map_err(RepairError::Output)? {
                 return Ok(());
             }
-            if image.path.symlink_metadata().is_ok() {
+            let is_ours = self.replaces.contains(&image.path);
+            if !is_ours && image.path.symlink_metadata().is_ok() {
                 return Err(RepairError::ForeignLibrary { path: image.path.clone() });
             }
             visit(image)
@@ -183,16 +190,19 @@ impl Beside<'_> {
 pub(super) fn keep_libraries<'o>(
     format: Format,
     outputs: impl Iterator<Item = &'o PathBuf>,
+    limits: &Limits,
 ) -> Result<(), RepairError> {
     if format != Format::Obj {
         return Ok(());
     }
-    outputs
-        .into_iter()
-        .try_for_each(|output| keep_foreign(&output.with_file_name(library_name(output))))
+    let mut libraries = outputs.map(|output| output.with_file_name(library_name(output)));
+    libraries.try_for_each(|library| keep_foreign(&library, &limits.replaces))
 }
 
-fn keep_foreign(path: &Path) -> Result<(), RepairError> {
+fn keep_foreign(path: &Path, replaces: &[PathBuf]) -> Result<(), RepairError> {
+    if replaces.iter().any(|ours| ours == path) {
+        return Ok(());
+    }
     let foreign = || RepairError::ForeignLibrary { path: path.to_path_buf() };
     let file = match std::fs::File::open(path) {
         Ok(file) => file,

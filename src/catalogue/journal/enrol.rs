@@ -56,15 +56,19 @@ const DOUBLES: &str = "
     WHERE wish IN (SELECT wish FROM temp.seen GROUP BY wish HAVING count(*) > 1)";
 
 const NEW: &str = "
-    INSERT INTO model (path, name, output, format, run_id, state, settings_digest,
+    INSERT INTO model (path, name, output, format, run_id, state, because, settings_digest,
                        input_bytes, input_mtime_ns, input_ctime_ns, input_inode)
-    SELECT path, name, wish, format, ?1, 'pending', settings, bytes, mtime_ns, ctime_ns, inode
-    FROM temp.seen WHERE true
+    SELECT path, name, wish, format, ?1, 'pending', 'it is new', settings, bytes, mtime_ns, ctime_ns,
+           inode FROM temp.seen WHERE true
     ON CONFLICT (path) DO UPDATE SET run_id = excluded.run_id";
 
 /// Other settings, another place, or back again: what was made counts no longer.
 const ASKED_ANEW: &str = "
     UPDATE model SET state = 'pending', verdict = NULL, cause = NULL, reason = NULL,
+        because = CASE WHEN model.state = 'gone' THEN 'it is there again'
+            WHEN model.settings_digest <> seen.settings
+            THEN 'other settings, or another version of the program'
+            ELSE 'its result has another name or format' END,
         settings_digest = seen.settings, output = seen.wish, format = seen.format,
         predicted_seconds = NULL
     FROM temp.seen AS seen WHERE seen.path = model.path

@@ -3,9 +3,11 @@
 use rusqlite::params;
 
 use crate::catalogue::CatalogueError;
+use crate::catalogue::beside::SideFile;
 use crate::catalogue::job::{Figures, OutputFile};
 use crate::catalogue::journal::Journal;
 use crate::catalogue::journal::enrol::bytes_of;
+use crate::catalogue::journal::side_files::write_beside;
 use crate::catalogue::stamp::{Stamp, Stamped};
 use crate::catalogue::state::{Cause, State};
 use crate::repair::Verdict;
@@ -21,8 +23,11 @@ pub struct Finished<'f> {
     pub reason: Option<String>,
     /// Of a repaired model.
     pub figures: Option<&'f Figures>,
-    /// The files of the result.
+    /// The files of the result, the model itself first.
     pub files: &'f [OutputFile],
+    /// The files that the model names, by their paths within the folder of the models; where it is
+    /// not known, those of before count on.
+    pub beside: Option<Vec<SideFile>>,
     /// Now.
     pub now_ms: u64,
     /// Wall time of the last attempt.
@@ -47,7 +52,19 @@ impl Journal {
         self.with(|connection| {
             let transaction = connection.transaction()?;
             write_row(&transaction, id, state, finished)?;
-            transaction.execute("DELETE FROM output_file WHERE model_id = ?1", [id])?;
+            // What failed has left the files of its last result where they were.
+            if state.has_result() {
+                transaction
+                    .prepare_cached("DELETE FROM output_file WHERE model_id = ?1")?
+                    .execute([id])?;
+                let result = finished.files.first().map(|file| file.path.to_path());
+                transaction
+                    .prepare_cached("UPDATE model SET result = nullif(?2, output) WHERE id = ?1")?
+                    .execute(params![id, result.as_deref().map(bytes_of)])?;
+            }
+            if let Some(beside) = &finished.beside {
+                write_beside(&transaction, id, beside)?;
+            }
             for file in finished.files {
                 let Stamped { stamp, digest } = file.stamped;
                 transaction

@@ -93,7 +93,8 @@ pub enum ListOrder {
     FailedFor(&'static str),
 }
 
-const COLUMNS: &str = "id, name, output, state, verdict, cause, reason, seconds, peak_bytes,
+const COLUMNS: &str =
+    "id, name, coalesce(result, output), state, verdict, cause, reason, seconds, peak_bytes,
     input_bytes, triangles_before, triangles_after, depth";
 
 fn listed_of(row: &Row) -> rusqlite::Result<ListedModel> {
@@ -159,7 +160,8 @@ impl Journal {
     /// The journal cannot be read.
     pub fn totals(&mut self) -> Result<Totals, CatalogueError> {
         let asked = "SELECT count(*), coalesce(sum(input_bytes), 0),
-                (SELECT coalesce(sum(bytes), 0) FROM output_file),
+                (SELECT coalesce(sum(bytes), 0) FROM output_file WHERE model_id IN
+                    (SELECT id FROM model WHERE state IN ('copied', 'repaired', 'degraded'))),
                 coalesce(sum(triangles_before), 0), coalesce(sum(triangles_after), 0),
                 coalesce(sum(seconds), 0.0), coalesce(sum(cpu_seconds), 0.0),
                 coalesce(max(peak_bytes), 0) FROM model";

@@ -1,7 +1,7 @@
 //! The journal: what is known of every model, in a database that people may query.
 //!
 //! In:         what the batch finds and does, as it happens.
-//! Out:        the tables of `schema.sql`.
+//! Out:        the tables of `schema.sql`; those of older versions become such.
 //! Invariant:  what a call has written outlives the process; a batch that was killed leaves attempts
 //!             without an end, and nothing half written. One process writes, any number reads.
 //! Memory:     the cache of the database, 2 MiB.
@@ -12,6 +12,8 @@ mod enrol;
 mod finish;
 mod listing;
 mod models;
+mod schema;
+mod side_files;
 mod summary;
 
 pub use attempts::AttemptRow;
@@ -19,21 +21,21 @@ pub use enrol::{Enrolled, Seen};
 pub use finish::Finished;
 pub use listing::{CauseGroup, ListOrder, ListedModel, OutcomeSum, Totals};
 pub use models::ModelRow;
-pub use summary::{Failure, StateCount, Summary, Told, UnderWay};
+pub use side_files::SideRow;
+pub use summary::{Failure, StateCount, Summary, Told, ToldBeside, UnderWay};
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
 
-use rusqlite::{Connection, OpenFlags, OptionalExtension};
+use rusqlite::{Connection, OpenFlags};
 
 use crate::catalogue::CatalogueError;
+use crate::catalogue::journal::schema::SCHEMA;
 
 /// Folder of a catalogue's own files, in that of the results.
 pub const FOLDER: &str = ".brickmend";
 /// The journal in it.
 pub const JOURNAL: &str = "journal.sqlite";
-/// Version of the tables.
-const SCHEMA: &str = "1";
 /// How long one process waits for another's transaction.
 const PATIENCE: Duration = Duration::from_secs(30);
 
@@ -44,7 +46,8 @@ pub struct Journal {
 }
 
 impl Journal {
-    /// Opens the journal of the results in `target`, or begins it. The caller holds the lock of the
+    /// Opens the journal of the results in `target`, takes it over from an older version, or begins
+    /// it. The caller holds the lock of the
     /// folder: two processes that begin a journal at once would be in each other's way.
     ///
     /// # Errors
@@ -75,6 +78,7 @@ impl Journal {
         let journal = Self { path, connection };
         let patient = journal.connection.busy_timeout(PATIENCE);
         patient
+            .and_then(|()| schema::look_as_it_is(&journal.connection))
             .and_then(|()| journal.connection.pragma_update(None, "query_only", true))
             .or_else(|error| journal.fail(error))?;
         journal.check_schema()?;
@@ -86,26 +90,12 @@ impl Journal {
         self.connection.pragma_update(None, "journal_mode", "WAL")?;
         self.connection.pragma_update(None, "synchronous", "NORMAL")?;
         self.connection.pragma_update(None, "foreign_keys", true)?;
-        let tables = "SELECT count(*) FROM sqlite_master WHERE name = 'meta'";
-        let begun: i64 = self.connection.query_row(tables, (), |row| row.get(0))?;
-        if begun > 0 {
-            return Ok(());
-        }
-        let transaction = self.connection.transaction()?;
-        transaction.execute_batch(include_str!("schema.sql"))?;
-        transaction.execute("INSERT INTO meta VALUES ('schema', ?1)", [SCHEMA])?;
-        transaction.commit()
+        schema::prepare(&mut self.connection)
     }
 
     fn check_schema(&self) -> Result<(), CatalogueError> {
-        let asked = "SELECT value FROM meta WHERE key = 'schema'";
-        let found: Option<String> = self
-            .connection
-            .query_row(asked, (), |row| row.get(0))
-            .optional()
-            .or_else(|error| self.fail(error))?;
-        match found {
-            Some(found) if found == SCHEMA => Ok(()),
+        match schema::found(&self.connection).or_else(|error| self.fail(error))? {
+            Some(found) if schema::is_known(&found) => Ok(()),
             found => Err(CatalogueError::OtherSchema {
                 path: self.path.clone(),
                 found: found.unwrap_or_default(),

@@ -174,14 +174,32 @@ impl Journal {
         })
     }
 
-    /// Asks for the models `ids` anew.
+    /// Whether a file is one of the result of another model too.
+    ///
+    /// # Errors
+    /// The journal cannot be read.
+    pub fn is_file_of_another(&mut self, id: i64, file: &Path) -> Result<bool, CatalogueError> {
+        let asked = "SELECT EXISTS (SELECT 1 FROM output_file WHERE path = ?1 AND model_id <> ?2)";
+        self.with(|connection| {
+            let words = params![bytes_of(file), id];
+            connection.prepare_cached(asked)?.query_row(words, |row| row.get(0))
+        })
+    }
+
+    /// Asks for the models `ids` anew, because of what is told in one line.
     ///
     /// # Errors
     /// The journal cannot be written.
-    pub fn ask_anew(&mut self, ids: &[i64]) -> Result<(), CatalogueError> {
+    pub fn ask_anew(&mut self, ids: &[i64], because: &str) -> Result<(), CatalogueError> {
         let update = "UPDATE model SET state = 'pending', verdict = NULL, cause = NULL,
-            reason = NULL WHERE id = ?1";
-        self.each(update, ids)
+            reason = NULL, because = ?2 WHERE id = ?1";
+        self.with(|connection| {
+            let transaction = connection.transaction()?;
+            for id in ids {
+                transaction.prepare_cached(update)?.execute(params![id, because])?;
+            }
+            transaction.commit()
+        })
     }
 
     /// Asks for the models anew of which `condition` (SQL over columns of `model`) holds.
@@ -194,20 +212,10 @@ impl Journal {
         condition: &str,
     ) -> Result<u64, CatalogueError> {
         let update = format!(
-            "UPDATE model SET state = 'pending', verdict = NULL, cause = NULL, reason = NULL
-             WHERE run_id = ?1 AND state NOT IN ('pending', 'gone') AND ({condition})"
+            "UPDATE model SET state = 'pending', verdict = NULL, cause = NULL, reason = NULL,
+             because = 'it was asked for by --retry' WHERE run_id = ?1 AND state NOT IN ('pending', 'gone') AND ({condition})"
         );
         self.with(|connection| Ok(connection.execute(&update, [run])? as u64))
-    }
-
-    fn each(&mut self, statement: &str, ids: &[i64]) -> Result<(), CatalogueError> {
-        self.with(|connection| {
-            let transaction = connection.transaction()?;
-            for id in ids {
-                transaction.prepare_cached(statement)?.execute([id])?;
-            }
-            transaction.commit()
-        })
     }
 
     /// Notes what the file system says now of an input whose content is as it was.

@@ -20,6 +20,7 @@ CREATE TABLE model (
     path              BLOB NOT NULL UNIQUE,
     name              TEXT NOT NULL,
     output            BLOB NOT NULL,
+    result            BLOB,               -- where the result lies, if that is not output
     format            TEXT NOT NULL,
     run_id            INTEGER NOT NULL,   -- the last run that saw it
     -- pending, copied, repaired, degraded, failed, gone
@@ -29,6 +30,8 @@ CREATE TABLE model (
     -- of a failed one: input, model, usage, memory, timeout, crash, internal, disk, lock, temporary
     cause             TEXT,
     reason            TEXT,
+    -- why it was asked for the last time
+    because           TEXT,
     -- the input as it was when its result was made, and its settings
     input_bytes       INTEGER NOT NULL,
     input_mtime_ns    INTEGER NOT NULL,
@@ -70,6 +73,22 @@ CREATE TABLE output_file (
     digest    BLOB NOT NULL,
     PRIMARY KEY (model_id, path)
 ) WITHOUT ROWID;
+
+CREATE INDEX output_file_path ON output_file (path);
+
+-- The files that a model names, by their paths within the folder of the models: libraries, images,
+-- buffers. Those that are not there have no digest.
+CREATE TABLE side_file (
+    path      BLOB NOT NULL,
+    model_id  INTEGER NOT NULL REFERENCES model (id) ON DELETE CASCADE,
+    bytes     INTEGER,
+    mtime_ns  INTEGER,
+    ctime_ns  INTEGER,
+    inode     INTEGER,
+    digest    BLOB,
+    PRIMARY KEY (path, model_id)
+) WITHOUT ROWID;
+CREATE INDEX side_file_model ON side_file (model_id);
 
 -- Each time a worker was set to a model.
 CREATE TABLE attempt (

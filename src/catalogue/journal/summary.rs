@@ -76,6 +76,15 @@ pub struct Summary {
 /// Version of [`Summary`].
 const SCHEMA: u32 = 1;
 
+/// A file that a model names.
+#[derive(Clone, Debug, PartialEq, Serialize)]
+pub struct ToldBeside {
+    /// Its path within the folder of the models, as text.
+    pub name: String,
+    /// Whether it was there when the model was worked on.
+    pub is_there: bool,
+}
+
 /// All that the journal says of a model.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Told {
@@ -91,10 +100,14 @@ pub struct Told {
     pub cause: Option<String>,
     /// In one line.
     pub reason: Option<String>,
+    /// Why it was asked for the last time, in one line.
+    pub because: Option<String>,
     /// What it took.
     pub seconds: Option<f64>,
     /// Peak memory of its worker.
     pub peak_bytes: Option<u64>,
+    /// The files that it names, by their paths within the folder of the models.
+    pub beside: Vec<ToldBeside>,
     /// Every attempt.
     pub attempts: Vec<AttemptRow>,
 }
@@ -183,9 +196,9 @@ impl Journal {
     /// # Errors
     /// The journal cannot be read.
     pub fn tell(&mut self, id: i64) -> Result<Told, CatalogueError> {
-        let attempts = self.attempts(id)?;
-        let asked = "SELECT name, output, state, verdict, cause, reason, seconds, peak_bytes
-            FROM model WHERE id = ?1";
+        let (attempts, beside) = (self.attempts(id)?, self.beside(id)?);
+        let asked = "SELECT name, coalesce(result, output), state, verdict, cause, reason, seconds,
+            peak_bytes, because FROM model WHERE id = ?1";
         self.with(|connection| {
             connection.query_row(asked, [id], |row| {
                 Ok(Told {
@@ -197,6 +210,8 @@ impl Journal {
                     reason: row.get(5)?,
                     seconds: row.get(6)?,
                     peak_bytes: row.get::<_, Option<i64>>(7)?.map(|bytes| bytes as u64),
+                    because: row.get(8)?,
+                    beside,
                     attempts,
                 })
             })

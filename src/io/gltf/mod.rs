@@ -16,6 +16,7 @@ mod images;
 mod load;
 mod materials;
 mod model;
+mod named;
 mod nodes;
 mod reader;
 mod scene;
@@ -32,6 +33,7 @@ mod writer;
 mod writer_tests;
 
 pub(crate) use crate::io::gltf::container::MAGIC;
+pub(crate) use crate::io::gltf::named::find_names;
 pub(crate) use crate::io::gltf::reader::GltfReader;
 #[cfg(test)]
 pub(crate) use crate::io::gltf::tests::gltf_square;

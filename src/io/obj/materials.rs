@@ -240,7 +240,7 @@ fn read_line(words: &mut Words) -> Result<Option<Stated>, IoError> {
 }
 
 /// The map that a statement gives, if we know of such.
-fn other_map(keyword: &[u8]) -> Option<OtherMaps> {
+pub(crate) fn other_map(keyword: &[u8]) -> Option<OtherMaps> {
     Some(match keyword.to_ascii_lowercase().as_slice() {
         b"map_bump" | b"bump" | b"norm" | b"map_kn" | b"disp" => OtherMaps::NORMAL,
         b"map_ks" | b"map_ns" | b"map_pr" | b"map_pm" | b"map_ps" | b"refl" => OtherMaps::GLOSS,
@@ -262,7 +262,7 @@ fn colour(text: &str) -> Option<[f32; 3]> {
 }
 
 /// The name of an image behind the options of its statement (`-s 1 1 1`, `-clamp on`, ...).
-fn texture_name(line: &str) -> &str {
+pub(crate) fn texture_name(line: &str) -> &str {
     let mut rest = line.trim_start();
     while rest.starts_with('-') {
         let takes_word = ["-imfchan", "-type", "-texres"].iter().any(|o| rest.starts_with(o));

@@ -5,6 +5,7 @@
 
 mod library;
 mod materials;
+mod named;
 mod normalised;
 mod statements;
 mod stream_reader;
@@ -15,6 +16,7 @@ mod writer;
 
 use crate::io::input::Input;
 pub use crate::io::obj::library::{LIBRARY_MARK, library_name, write_library};
+pub(crate) use crate::io::obj::named::find_names;
 use crate::io::obj::stream_reader::ObjStreamReader;
 use crate::io::obj::tobj_reader::{Attempt, TobjReader};
 pub(crate) use crate::io::obj::writer::ObjWriter;

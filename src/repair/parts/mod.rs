@@ -79,7 +79,7 @@ pub fn repair_parts(
     let seen = InputIdentity::of(input)?;
     let key = run_key(input, format, settings, "", &recording)?;
     let outputs = vec![output.to_path_buf()];
-    keep_libraries(format, outputs.iter())?;
+    keep_libraries(format, outputs.iter(), limits)?;
     let workspace = Workspace::open(input, output, outputs, limits, key)?;
     let accountant = Accountant::new(limits.max_memory_bytes);
     let assembly = Assembly {
@@ -171,7 +171,12 @@ impl Assembly<'_> {
             model.places = Places::find(model.scattered_mut(), &resources)?;
         }
         let options = self.write_options(&mut model);
-        let beside = Beside { format: self.format, options: &options, workspace: self.workspace };
+        let beside = Beside {
+            format: self.format,
+            options: &options,
+            workspace: self.workspace,
+            replaces: &self.limits.replaces,
+        };
         beside.keep_images()?;
         let mut rebuilt = Vec::new();
         let (outcome, concluded) = loop {

@@ -4,9 +4,10 @@ use std::io;
 
 use serde_json::Value;
 
-use crate::repair::{Outcome, Verdict};
+use crate::repair::Outcome;
 use crate::report::ModelPage;
 use crate::report::html::{Markup, bytes, count, decimal};
+use crate::report::model_page::part_table::{words_of, write_whole};
 
 /// A line of a table.
 type Fact = (&'static str, String);
@@ -14,17 +15,16 @@ type Fact = (&'static str, String);
 /// Writes the verdict with its reasons.
 pub(crate) fn write_verdict(html: &mut Markup, model: &ModelPage) -> io::Result<()> {
     html.element("section", &[("id", "verdict")], |html| {
+        if let Some(parts) = &model.parts {
+            return write_whole(html, parts);
+        }
         let Some(outcome) = model.outcome else {
             return html.element("p", &[("class", "verdict")], |html| {
                 html.leaf("span", &[("class", "badge is-copied")], "copied")?;
                 html.leaf("span", &[], "Nothing is wrong with it, so it was copied byte for byte.")
             });
         };
-        let (name, text) = match outcome.verdict {
-            Verdict::Pass => ("pass", "Sound, and nothing to look at."),
-            Verdict::Review => ("review", "Sound, but a person should look."),
-            Verdict::Fail => ("fail", "Not sound."),
-        };
+        let (name, text) = words_of(outcome.verdict);
         html.element("p", &[("class", "verdict")], |html| {
             html.leaf("span", &[("class", &format!("badge is-{name}"))], name)?;
             html.leaf("span", &[], text)

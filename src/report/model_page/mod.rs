@@ -9,9 +9,11 @@
 mod carried;
 mod facts;
 mod gallery;
+mod part_table;
 mod plot;
 
 pub use gallery::Gallery;
+pub use part_table::PartsPage;
 
 use std::cell::{Cell, RefCell};
 use std::io::{self, BufWriter, Write};
@@ -48,8 +50,11 @@ pub struct ModelPage<'p> {
     pub input: &'p Path,
     /// Its result.
     pub output: &'p Path,
-    /// What came of it; `None` where it was copied since nothing is wrong with it.
+    /// What came of it; `None` where it was copied since nothing is wrong with it, or its parts were
+    /// kept apart.
     pub outcome: Option<&'p Outcome>,
+    /// What came of its parts, where each was repaired for itself.
+    pub parts: Option<PartsPage<'p>>,
     /// Address of the page of the catalogue, if it is part of one.
     pub back: Option<&'p str>,
 }
@@ -177,6 +182,9 @@ fn write_shown(path: &Path, model: &ModelPage, shown: &Shown) -> Result<(), Repo
         })?;
         if shown.has_meshes {
             carried::write_meshes(html, &shown.meshes)?;
+        }
+        if let Some(parts) = &model.parts {
+            part_table::write_parts(html, parts)?;
         }
         let Some(outcome) = model.outcome else { return Ok(()) };
         facts::write_facts(html, outcome)?;
