@@ -11,8 +11,8 @@ use brickmend::repair::{
     repair_levels, repair_parts,
 };
 use brickmend::report::{
-    ModelPage, OpenSource, PageOptions, PreviewOptions, ReportError, write_model_page,
-    write_preview,
+    Measuring, ModelPage, OpenSource, PageOptions, PreviewOptions, ReportError, Scene,
+    write_model_page, write_preview,
 };
 use brickmend::store::Scratch;
 use clap::Args;
@@ -53,7 +53,8 @@ pub struct RepairArguments {
     /// the parts and of the whole; see docs/outcome.md and docs/parts.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
-    /// Draw input beside output into a PNG or EXR file.
+    /// Draw input, output and a map of deviations into a PNG file, or layers of numbers into an EXR
+    /// file; see docs/preview.md.
     #[arg(long, value_name = "FILE", help_heading = "Report")]
     preview: Option<PathBuf>,
     /// Write a page of the model: verdict, what was found and done, before and after.
@@ -267,7 +268,7 @@ fn draw_preview(arguments: &RepairArguments, chatter: &Chatter) -> Option<Exit> 
     Some(Exit::Unusable)
 }
 
-/// Draws input beside output; a sixth of the memory budget is for the bands.
+/// Draws input, output and the map; a sixth of the memory budget is for all of them.
 fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
     let scratch =
         Scratch::new(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
@@ -281,9 +282,11 @@ fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
     let output: &OpenSource<brickmend::io::IoError> = &|| open(&arguments.output);
     let options =
         PreviewOptions { share_bytes, edges: arguments.preview_edges, ..PreviewOptions::default() };
-    write_preview(path, input, Some(output), &options, &Void)
-        .map(|_| ())
-        .map_err(|error| error.to_string())
+    let threads = arguments.resources.limits().threads;
+    let wants_map = arguments.result.settings().deviation;
+    let measuring = wants_map.then_some(Measuring { scratch: &scratch, threads });
+    let scene = Scene { input, output: Some(output), measuring, monitor: &Void };
+    write_preview(path, &scene, &options).map(|_| ()).map_err(|error| error.to_string())
 }
 
 /// Writes the page of the model; a sixth of the memory budget is for pictures and meshes.

@@ -97,6 +97,7 @@ pub(crate) fn write_exr<E: std::error::Error>(
         bands: 1,
         input: input_stats,
         output: output_stats,
+        largest_deviation: None,
         bytes: staged.put_in_place()?,
     })
 }

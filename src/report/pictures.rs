@@ -6,7 +6,7 @@
 
 use std::io;
 
-use crate::report::image_png::{Layout, SEPARATOR_PX, draw_bands};
+use crate::report::preview::panels::{Layout, draw_bands};
 use crate::report::preview::scene::Scene;
 use crate::report::preview::{PreviewError, PreviewOptions, PreviewStats};
 
@@ -28,16 +28,16 @@ pub(crate) fn draw_pair<E: std::error::Error>(
     let held = 6 * u64::from(options.width_px) * u64::from(options.height_px);
     let share_bytes = options.share_bytes.saturating_sub(held);
     let options = PreviewOptions { share_bytes, ..*options };
-    let layout = Layout::new(&options)?;
+    let layout = Layout::new(&options, false)?;
     let size = Layout::samples_of_view(&options);
     let cameras = scene.cameras(&options, size)?;
-    let side_px = (layout.width_px - SEPARATOR_PX) / 2;
+    let side_px = layout.side_px;
     let empty = || Picture { width_px: side_px, height_px: layout.height_px, bytes: Vec::new() };
     let mut pair = [empty(), empty()];
     let row_bytes = 3 * layout.width_px as usize;
     let mut stats = PreviewStats::default();
-    draw_bands(scene, &options, &layout, &cameras, &mut stats, |rows| {
-        for row in rows.chunks_exact(row_bytes) {
+    draw_bands(scene, &options, (&layout, &cameras, None), &mut stats, |rows| {
+        for row in rows.pixels.chunks_exact(row_bytes) {
             let side_bytes = 3 * side_px as usize;
             pair[0].bytes.extend_from_slice(&row[..side_bytes]);
             pair[1].bytes.extend_from_slice(&row[row_bytes - side_bytes..]);

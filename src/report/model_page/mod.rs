@@ -27,8 +27,7 @@ use crate::report::html::{Frame, write_page};
 use crate::report::image_staged::StagedFile;
 use crate::report::light_mesh::{Cube, Known, LightMesh, Lightening, Overheard};
 use crate::report::pictures::{Picture, draw_pair};
-use crate::report::preview::scene::Scene;
-use crate::report::preview::{OpenSource, PreviewOptions, Side};
+use crate::report::preview::{OpenSource, PreviewOptions, Scene, Side};
 use crate::store::Scratch;
 
 const COMPARE: &str = include_str!("../html/assets/compare.js");
@@ -144,11 +143,13 @@ fn look(
         })
     };
     let (width_px, height_px) = (options.picture_px, options.picture_px);
-    let preview = PreviewOptions { width_px, height_px, share_bytes, ..PreviewOptions::default() };
+    let creases = options.mesh_triangles > 0;
+    let preview =
+        PreviewOptions { width_px, height_px, share_bytes, creases, ..PreviewOptions::default() };
     let pictures = {
         let input: &OpenSource<IoError> = &|| overhear(0, model.input);
         let output: &OpenSource<IoError> = &|| overhear(1, model.output);
-        draw_pair(&Scene { input, output: Some(output), monitor }, &preview)?
+        draw_pair(&Scene { input, output: Some(output), measuring: None, monitor }, &preview)?
     };
     let meshes = lightenings.map(|lightening| {
         lightening.map_or_else(LightMesh::default, |lightening| lightening.into_inner().finish())

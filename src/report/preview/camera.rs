@@ -141,6 +141,23 @@ impl Camera {
         }
     }
 
+    /// The place of the model that a sample shows; the depth as [`Self::project`] gives it.
+    pub(crate) fn unproject(&self, x: f64, y: f64, depth: f64) -> DVec3 {
+        let from_centre = DVec3::new(
+            (x - self.width * 0.5) / self.scale,
+            (self.height * 0.5 - y) / self.scale,
+            depth * self.depth_range + self.near,
+        );
+        let along = self.centre + from_centre * self.unit;
+        let Frame { right, up, forward } = self.frame;
+        right * along.x + up * along.y + forward * along.z
+    }
+
+    /// The length of the depth range in samples.
+    pub(crate) fn depth_samples(&self) -> f64 {
+        self.depth_range * self.scale
+    }
+
     /// A normal as the viewer sees it: x right, y up, z towards the viewer.
     pub(crate) fn turn(&self, normal: DVec3) -> DVec3 {
         self.frame.along(normal) * DVec3::new(1.0, 1.0, -1.0)
@@ -186,6 +203,9 @@ mod tests {
                 for frame in Frame::all(Views::Four, up) {
                     let camera = camera(frame, &[corners]);
                     for at in corners.map(|corner| camera.project(corner)) {
+                        let again = camera.project(camera.unproject(at.x, at.y, at.depth));
+                        let off = (again.x - at.x).abs().max((again.y - at.y).abs());
+                        assert!(off.max((again.depth - at.depth).abs()) < 1e-6, "{again:?} {at:?}");
                         assert!(at.x > 0.0 && at.x < 400.0, "{at:?}");
                         assert!(at.y > 0.0 && at.y < 300.0, "{at:?}");
                         assert!(at.depth > 0.0 && at.depth < 1.0, "{at:?}");

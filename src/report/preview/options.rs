@@ -35,6 +35,8 @@ pub struct PreviewOptions {
     pub up: UpAxis,
     /// Whether the edges of triangles are drawn as dark lines.
     pub edges: bool,
+    /// Whether creases, and where one surface ends before another, are drawn as dark lines (PNG).
+    pub creases: bool,
 }
 
 impl Default for PreviewOptions {
@@ -46,6 +48,7 @@ impl Default for PreviewOptions {
             views: Views::default(),
             up: UpAxis::default(),
             edges: false,
+            creases: true,
         }
     }
 }
@@ -64,7 +67,7 @@ pub struct SideStats {
 }
 
 /// What was drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PreviewStats {
     /// Width of the picture (PNG) or of a layer (EXR).
     pub width_px: u32,
@@ -76,6 +79,8 @@ pub struct PreviewStats {
     pub input: SideStats,
     /// The mesh after the repair.
     pub output: SideStats,
+    /// The largest deviation that the map shows, model units; `None` where there is no map.
+    pub largest_deviation: Option<f64>,
     /// Size of the finished file.
     pub bytes: u64,
 }

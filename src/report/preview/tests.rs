@@ -11,10 +11,13 @@ use exr::prelude::{ReadChannels, ReadLayers};
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::{Monitor, Void};
 use crate::report::image_exr::NO_PART;
-use crate::report::image_png::SEPARATOR_PX;
+use crate::report::preview::legend::WIDTH_PX;
+use crate::report::preview::panels::SEPARATOR_PX;
 use crate::report::preview::{
-    OpenSource, PreviewError, PreviewOptions, PreviewStats, Side, Views, write_preview,
+    Measuring, OpenSource, PreviewError, PreviewOptions, PreviewStats, Scene, Side, Views,
+    write_preview,
 };
+use crate::store::Scratch;
 
 type Triangles = Vec<[[f64; 3]; 3]>;
 
@@ -89,7 +92,31 @@ fn write(
     let open_output = output.map(|output| move || open(output));
     let open_output: Option<&OpenSource<'_, io::Error>> =
         open_output.as_ref().map(|open| open as &OpenSource<'_, io::Error>);
-    write_preview(path, &|| open(input), open_output, options, &Void)
+    let scene =
+        Scene { input: &|| open(input), output: open_output, measuring: None, monitor: &Void };
+    write_preview(path, &scene, options)
+}
+
+/// The same with a map, by so many threads.
+fn write_map(
+    path: &Path,
+    (input, output): (&Triangles, &Triangles),
+    options: &PreviewOptions,
+    threads: usize,
+) -> Result<PreviewStats, PreviewError<io::Error>> {
+    let scratch = Scratch::new(path.parent().unwrap());
+    let measuring = Some(Measuring { scratch: &scratch, threads });
+    let (input, output): (&OpenSource<'_, io::Error>, &OpenSource<'_, io::Error>) =
+        (&|| open(input), &|| open(output));
+    let scene = Scene { input, output: Some(output), measuring, monitor: &Void };
+    write_preview(path, &scene, options)
+}
+
+/// The cube without its top (y = 1).
+fn open_cube() -> Triangles {
+    let mut open = cube();
+    open.retain(|corners| corners.iter().any(|corner| corner[1] < 0.5));
+    open
 }
 
 struct Picture {
@@ -215,7 +242,7 @@ fn holes_and_turned_faces_show_their_backs() {
     let stats = write(&path, &cube(), Some(&inside_out), &small()).unwrap();
     assert_eq!((stats.output.front_samples, stats.input.back_samples), (0, 0));
     assert_eq!(stats.output.back_samples, stats.input.front_samples);
-    let [red, green, blue] = Picture::read(&path).pixel(120 + SEPARATOR_PX as usize + 60, 50);
+    let [red, green, blue] = Picture::read(&path).pixel(120 + SEPARATOR_PX as usize + 80, 65);
     assert!(red > 150 && green < 60 && blue < 60);
 }
 
@@ -255,6 +282,64 @@ fn edges_darken_pixels_along_the_edges_only() {
     let changed: Vec<_> = places.filter(|&(x, y)| plain.pixel(x, y) != lined.pixel(x, y)).collect();
     assert!(changed.len() > 300 && changed.len() < 1500, "{}", changed.len());
     assert!(changed.iter().all(|&(x, y)| lined.pixel(x, y)[0] <= plain.pixel(x, y)[0]));
+}
+
+#[test]
+fn the_map_is_hot_where_a_lid_was_put_on_and_grey_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lid.png");
+    let stats = write_map(&path, (&open_cube(), &cube()), &small(), 2).unwrap();
+    let picture = Picture::read(&path);
+    let map = 2 * (120 + SEPARATOR_PX as usize);
+    assert_eq!(picture.width, map + 120 + WIDTH_PX as usize);
+    // The middle of the lid is half an edge from the walls.
+    let largest = stats.largest_deviation.unwrap();
+    assert!((0.48..=0.5).contains(&largest), "{largest}");
+    let spread = |[red, green, blue]: [u8; 3]| red.max(green).max(blue) - red.min(green).min(blue);
+    for (x, y) in [(40, 65), (80, 65), (35, 60), (85, 70)] {
+        assert!(spread(picture.pixel(map + x, y)) < 16, "a wall has not moved");
+    }
+    let [red, green, blue] = picture.pixel(map + 60, 25);
+    assert!(red > green + 60 && red > blue, "{red} {green} {blue}");
+}
+
+#[test]
+fn where_nothing_can_be_measured_there_is_no_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("none.png");
+    let stats = write_map(&path, (&vec![[[1.0; 3]; 3]], &cube()), &small(), 1).unwrap();
+    assert_eq!((stats.largest_deviation, stats.width_px), (None, 2 * 120 + SEPARATOR_PX));
+    let stats = write_map(&path, (&cube(), &Vec::new()), &small(), 1).unwrap();
+    assert_eq!(stats.largest_deviation, Some(0.0), "an empty output shows nothing");
+}
+
+#[test]
+fn a_map_is_the_same_for_any_share_and_any_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.png");
+    let pictures = [(200 << 10, 1), (200 << 10, 3), (64 << 20, 2)].map(|(share_bytes, threads)| {
+        let options = PreviewOptions { share_bytes, views: Views::Four, ..small() };
+        write_map(&path, (&open_cube(), &cube()), &options, threads).unwrap();
+        fs::read(&path).unwrap()
+    });
+    assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
+}
+
+#[test]
+fn creases_are_dark_and_faces_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plain, creased] = [false, true].map(|creases| {
+        let path = folder.path().join(format!("{creases}.png"));
+        write(&path, &cube(), None, &PreviewOptions { creases, ..small() }).unwrap();
+        Picture::read(&path)
+    });
+    let places = (0..100).flat_map(|y| (0..120).map(move |x| (x, y)));
+    let changed: Vec<_> =
+        places.filter(|&(x, y)| plain.pixel(x, y) != creased.pixel(x, y)).collect();
+    // Three edges of the cube meet in the middle of the picture, each 53 pixels long.
+    assert!((140..500).contains(&changed.len()), "{}", changed.len());
+    assert!(changed.iter().all(|&(x, y)| creased.pixel(x, y)[0] < plain.pixel(x, y)[0]));
+    assert!(changed.contains(&(60, 80)), "the edge from the middle down");
 }
 
 #[test]
@@ -329,7 +414,8 @@ fn a_failing_source_leaves_the_old_picture_and_nothing_else() {
         opened.set(opened.get() + 1);
         if opened.get() > 1 { Err(io::ErrorKind::NotFound.into()) } else { open(&mesh) }
     };
-    let refusal = write_preview(&path, fading, None, &small(), &Void);
+    let scene = Scene { input: fading, output: None, measuring: None, monitor: &Void };
+    let refusal = write_preview(&path, &scene, &small());
     assert!(matches!(refusal, Err(PreviewError::Source { side: Side::Input, .. })));
     assert_eq!(fs::read(&path).unwrap(), b"old");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -346,7 +432,9 @@ fn a_request_to_stop_is_heard() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("never.png");
     let mesh = cube();
-    let stopped = write_preview(&path, &|| open(&mesh), None, &small(), &Stopping);
+    let input: &OpenSource<'_, io::Error> = &|| open(&mesh);
+    let scene = Scene { input, output: None, measuring: None, monitor: &Stopping };
+    let stopped = write_preview(&path, &scene, &small());
     assert!(matches!(stopped, Err(PreviewError::Cancelled)));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }
