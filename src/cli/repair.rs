@@ -4,6 +4,7 @@ use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
+use brickmend::contour::SurfaceDetail;
 use brickmend::io::{Format, ReadOptions, format_of_extension};
 use brickmend::monitor::Void;
 use brickmend::repair::{
@@ -11,8 +12,8 @@ use brickmend::repair::{
     repair_levels, repair_parts,
 };
 use brickmend::report::{
-    Measuring, ModelPage, OpenSource, PageOptions, PreviewOptions, ReportError, Scene,
-    write_model_page, write_preview,
+    Measuring, ModelPage, OpenSource, PageOptions, PatchRule, PreviewOptions, ReportError, Scene,
+    Views, write_model_page, write_preview,
 };
 use brickmend::store::Scratch;
 use clap::Args;
@@ -60,6 +61,10 @@ pub struct RepairArguments {
     /// Write a page of the model: verdict, what was found and done, before and after.
     #[arg(long, value_name = "FILE.html", help_heading = "Report")]
     report: Option<PathBuf>,
+    /// How many views an EXR file has: 6 along the axes, or 8 more from the corners of a cube.
+    #[arg(long, value_name = "6|14", default_value = "6", requires = "preview", value_parser = ["6", "14"],
+          help_heading = "Report")]
+    preview_views: String,
     /// Draw the edges of the triangles as well.
     #[arg(long, requires = "preview", help_heading = "Report")]
     preview_edges: bool,
@@ -133,7 +138,7 @@ fn run_parts(
         Err(error) => return fail(&error, stop, chatter),
     };
     let exit = if whole.verdict == Verdict::Fail { Exit::NoResult } else { Exit::Success };
-    let exit = draw_preview(arguments, chatter).unwrap_or(exit);
+    let exit = draw_preview(arguments, None, chatter).unwrap_or(exit);
     whole.stages = progress.stages();
     whole.peak_bytes = peak_resident_bytes();
     if arguments.json {
@@ -176,6 +181,9 @@ impl Told {
     }
 }
 
+/// Width and height of a view of an EXR file: there are many.
+const LAYER_PX: u32 = 512;
+
 /// The most parts whose reasons are told as text.
 const MOST_REVIEWS: usize = 8;
 
@@ -211,7 +219,7 @@ fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
 fn finish(arguments: &RepairArguments, outcomes: &mut [Outcome], chatter: &Chatter) -> ExitCode {
     let sound = outcomes.iter().all(|outcome| outcome.verdict != Verdict::Fail);
     let exit = if sound { Exit::Success } else { Exit::NoResult };
-    let mut exit = draw_preview(arguments, chatter).unwrap_or(exit);
+    let mut exit = draw_preview(arguments, outcomes.first(), chatter).unwrap_or(exit);
     for outcome in outcomes.iter_mut() {
         outcome.memory.peak_bytes = peak_resident_bytes();
     }
@@ -261,15 +269,19 @@ fn summary(outcome: &Outcome) -> String {
 }
 
 /// Draws the preview, if one is wanted; how the process ends where that fails.
-fn draw_preview(arguments: &RepairArguments, chatter: &Chatter) -> Option<Exit> {
+fn draw_preview(
+    arguments: &RepairArguments,
+    outcome: Option<&Outcome>,
+    chatter: &Chatter,
+) -> Option<Exit> {
     let path = arguments.preview.as_ref()?;
-    let error = draw(arguments, path).err()?;
+    let error = draw(arguments, outcome, path).err()?;
     chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));
     Some(Exit::Unusable)
 }
 
 /// Draws input, output and the map; a sixth of the memory budget is for all of them.
-fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
+fn draw(arguments: &RepairArguments, outcome: Option<&Outcome>, path: &Path) -> Result<(), String> {
     let scratch =
         Scratch::new(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
     let share_bytes = arguments.resources.max_memory / 6;
@@ -280,13 +292,41 @@ fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
     };
     let input: &OpenSource<brickmend::io::IoError> = &|| open(&arguments.input);
     let output: &OpenSource<brickmend::io::IoError> = &|| open(&arguments.output);
-    let options =
+    let drawing =
         PreviewOptions { share_bytes, edges: arguments.preview_edges, ..PreviewOptions::default() };
+    let options = match has_extension(path, "exr") {
+        true => PreviewOptions {
+            width_px: LAYER_PX,
+            height_px: LAYER_PX,
+            views: if arguments.preview_views == "14" { Views::Fourteen } else { Views::Six },
+            patches: patch_rule(arguments, outcome),
+            ..drawing
+        },
+        false => drawing,
+    };
     let threads = arguments.resources.limits().threads;
     let wants_map = arguments.result.settings().deviation;
     let measuring = wants_map.then_some(Measuring { scratch: &scratch, threads });
     let scene = Scene { input, output: Some(output), measuring, monitor: &Void };
     write_preview(path, &scene, &options).map(|_| ()).map_err(|error| error.to_string())
+}
+
+fn has_extension(path: &Path, extension: &str) -> bool {
+    path.extension().is_some_and(|found| found.eq_ignore_ascii_case(extension))
+}
+
+/// How it is known what closes an opening: by the output itself where it tells.
+fn patch_rule(arguments: &RepairArguments, outcome: Option<&Outcome>) -> PatchRule {
+    let told = outcome.map(|outcome| outcome.transfer.surfaces);
+    let is_told = match told {
+        Some(detail) => detail == SurfaceDetail::MaterialAndPatch,
+        None => arguments.result.settings().tag_patches,
+    };
+    if is_told {
+        return PatchRule::Tagged;
+    }
+    let deviation = outcome.and_then(|outcome| outcome.deviation.as_ref());
+    deviation.map_or(PatchRule::Unknown, |found| PatchRule::Beyond(found.tolerance))
 }
 
 /// Writes the page of the model; a sixth of the memory budget is for pictures and meshes.

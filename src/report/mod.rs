@@ -20,6 +20,6 @@ pub use catalogue_page::{FOLDER, INDEX, report_folder, write_catalogue_page};
 pub use error::ReportError;
 pub use model_page::{Gallery, ModelPage, PageOptions, write_model_page};
 pub use preview::{
-    Measuring, OpenSource, PreviewError, PreviewOptions, PreviewStats, Scene, Side, SideStats,
-    UpAxis, Views, write_preview,
+    Measuring, OpenSource, PatchRule, PreviewError, PreviewOptions, PreviewStats, Scene, Side,
+    SideStats, UpAxis, Views, write_preview,
 };

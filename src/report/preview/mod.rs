@@ -27,9 +27,10 @@ pub(crate) mod scene;
 pub(crate) mod shade;
 #[cfg(test)]
 mod tests;
+pub(crate) mod texels;
 
 pub use error::{PreviewError, Side};
-pub use options::{PreviewOptions, PreviewStats, SideStats, UpAxis, Views};
+pub use options::{PatchRule, PreviewOptions, PreviewStats, SideStats, UpAxis, Views};
 pub use scene::{Measuring, OpenSource, Scene};
 
 use std::path::Path;

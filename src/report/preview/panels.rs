@@ -16,7 +16,7 @@ use crate::report::preview::camera::{Camera, Grid};
 use crate::report::preview::creases::{Lines, REACH, Shown};
 use crate::report::preview::measuring::Ruler;
 use crate::report::preview::raster::{Band, Sample};
-use crate::report::preview::scene::{Painter, Scene};
+use crate::report::preview::scene::{Face, Painter, Scene};
 use crate::report::preview::shade::{BACKGROUND, SEPARATOR, to_srgb};
 use crate::report::preview::{PreviewError, PreviewOptions, PreviewStats, Side, SideStats};
 
@@ -108,7 +108,8 @@ pub(crate) fn draw_bands<E: std::error::Error>(
     stats: &mut PreviewStats,
     mut write: impl FnMut(Rows) -> Result<(), PreviewError<E>>,
 ) -> Result<(), PreviewError<E>> {
-    let painter = Painter { paint: shown, line_width: options.edges.then_some(LINE_SAMPLES) };
+    let line_width = options.edges.then_some(LINE_SAMPLES);
+    let painter = Painter { paint: shown, line_width, asks_patches: false };
     let stride = 3 * layout.width_px as usize;
     let mut pixels = vec![0_u8; stride * layout.band_rows_px as usize];
     let mut map = Vec::new();
@@ -140,7 +141,7 @@ pub(crate) fn draw_bands<E: std::error::Error>(
     Ok(())
 }
 
-fn shown(face: &crate::report::preview::scene::Face) -> Shown {
+fn shown(face: &Face) -> Shown {
     let light = (face.light * 254.0).round() as u8 + 1;
     Shown { colour: to_srgb(face.colour), light, normal: Shown::normal_of(face.seen) }
 }

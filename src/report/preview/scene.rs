@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use crate::mesh::{MeshSource, TriangleBatch};
+use crate::mesh::{MeshSource, Surface, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::report::preview::camera::{Bounds, Camera, Frame};
 use crate::report::preview::clip::clip;
@@ -15,6 +15,8 @@ use crate::report::preview::raster::{Band, Brush};
 use crate::report::preview::shade;
 use crate::report::preview::{PreviewError, PreviewOptions, Side, SideStats};
 use crate::store::Scratch;
+
+const PATCH_ENDING: &str = Surface::PATCH_ENDING;
 
 /// Opens a mesh from its beginning; called again for every band.
 pub type OpenSource<'a, E> = dyn Fn() -> Result<Box<dyn MeshSource<Error = E> + 'a>, E> + 'a;
@@ -51,8 +53,19 @@ pub(crate) struct Face {
     pub(crate) normal: DVec3,
     /// The unit normal as the viewer sees it, turned towards the viewer.
     pub(crate) seen: DVec3,
+    /// Whose it is.
+    pub(crate) owner: Owner,
+}
+
+/// What a file says of a triangle besides its corners.
+#[derive(Clone, Copy)]
+pub(crate) struct Owner {
     /// Index into the parts of the source.
     pub(crate) part: u32,
+    /// Index into its materials.
+    pub(crate) material: u32,
+    /// Whether the name of the material tells that it closes an opening; only where it is asked.
+    pub(crate) is_patch: bool,
 }
 
 /// Turns a face into what a sample stores.
@@ -61,6 +74,8 @@ pub(crate) struct Painter<P> {
     pub(crate) paint: fn(&Face) -> P,
     /// Width of the lines along edges, in samples.
     pub(crate) line_width: Option<f64>,
+    /// Whether materials are asked for patches.
+    pub(crate) asks_patches: bool,
 }
 
 impl<'a, E: std::error::Error> Scene<'_, 'a, E> {
@@ -68,7 +83,7 @@ impl<'a, E: std::error::Error> Scene<'_, 'a, E> {
     fn bounds(&self, frames: &[Frame]) -> Result<Vec<Bounds>, PreviewError<E>> {
         let mut bounds = vec![Bounds::EMPTY; frames.len()];
         for side in [Side::Output, Side::Input] {
-            self.stream(side, |corners, _| {
+            self.stream(side, false, |corners, _| {
                 let mut used = true;
                 for (bounds, frame) in bounds.iter_mut().zip(frames) {
                     used &= bounds.add(frame, corners);
@@ -101,7 +116,7 @@ impl<'a, E: std::error::Error> Scene<'_, 'a, E> {
         bands: &mut [(Camera, Band<P>)],
         painter: &Painter<P>,
     ) -> Result<SideStats, PreviewError<E>> {
-        let mut stats = self.stream(side, |corners, part| {
+        let mut stats = self.stream(side, painter.asks_patches, |corners, owner| {
             let normal = normal_of(corners);
             let mut drawn = true;
             for (camera, band) in &mut *bands {
@@ -109,7 +124,7 @@ impl<'a, E: std::error::Error> Scene<'_, 'a, E> {
                     let seen = camera.turn(if back { -normal } else { normal });
                     let light = shade::light(side, back, seen);
                     let colour = shade::shade(side, back, light);
-                    Face { colour, light, normal, seen, part }
+                    Face { colour, light, normal, seen, owner }
                 });
             }
             drawn
@@ -139,21 +154,32 @@ impl<'a, E: std::error::Error> Scene<'_, 'a, E> {
     fn stream(
         &self,
         side: Side,
-        mut take: impl FnMut(&[DVec3; 3], u32) -> bool,
+        asks_patches: bool,
+        mut take: impl FnMut(&[DVec3; 3], Owner) -> bool,
     ) -> Result<SideStats, PreviewError<E>> {
         let mut stats = SideStats::default();
         let failed = |source| PreviewError::Source { side, source };
         let Some(mut source) = self.open(side)? else { return Ok(stats) };
         let mut batch = TriangleBatch::default();
+        // The material that was asked for last, and whether it is one of patches.
+        let mut last = None;
         while source.next_batch(&mut batch).map_err(failed)? {
             if self.monitor.cancelled() {
                 return Err(PreviewError::Cancelled);
             }
             stats.triangles += batch.len() as u64;
-            for (corners, &part) in batch.corners.iter().zip(&batch.parts) {
+            let owners = batch.parts.iter().zip(&batch.materials);
+            for (corners, (&part, &material)) in batch.corners.iter().zip(owners) {
+                let is_patch = match last {
+                    _ if !asks_patches => false,
+                    Some((number, is_patch)) if number == material => is_patch,
+                    _ => source.material(material).map_err(failed)?.name.ends_with(PATCH_ENDING),
+                };
+                last = Some((material, is_patch));
+                let owner = Owner { part, material, is_patch };
                 let corners = corners.map(DVec3::from_array);
                 let finite = corners.iter().all(|corner| corner.is_finite());
-                stats.skipped_triangles += u64::from(!(finite && take(&corners, part)));
+                stats.skipped_triangles += u64::from(!(finite && take(&corners, owner)));
             }
         }
         Ok(stats)
