@@ -12,8 +12,8 @@ use brickmend::repair::{
     repair_levels, repair_parts,
 };
 use brickmend::report::{
-    Measuring, ModelPage, OpenSource, PageOptions, PatchRule, PreviewOptions, ReportError, Scene,
-    Views, write_model_page, write_preview,
+    MapOptions, Measuring, ModelPage, OpenSource, PageOptions, PatchRule, PreviewOptions,
+    ReportError, Scene, Views, write_model_page, write_preview,
 };
 use brickmend::store::Scratch;
 use clap::Args;
@@ -58,7 +58,8 @@ pub struct RepairArguments {
     /// file; see docs/preview.md.
     #[arg(long, value_name = "FILE", help_heading = "Report")]
     preview: Option<PathBuf>,
-    /// Write a page of the model: verdict, what was found and done, before and after.
+    /// Write a page of the model: verdict, what was found and done, before and after, and how far the
+    /// output lies from the input.
     #[arg(long, value_name = "FILE.html", help_heading = "Report")]
     report: Option<PathBuf>,
     /// How many views an EXR file has: 6 along the axes, or 8 more from the corners of a cube.
@@ -329,7 +330,8 @@ fn patch_rule(arguments: &RepairArguments, outcome: Option<&Outcome>) -> PatchRu
     deviation.map_or(PatchRule::Unknown, |found| PatchRule::Beyond(found.tolerance))
 }
 
-/// Writes the page of the model; a sixth of the memory budget is for pictures and meshes.
+/// Writes the page of the model; a sixth of the memory budget is for pictures and meshes, another one
+/// for measuring.
 fn write_page(
     arguments: &RepairArguments,
     outcome: &Outcome,
@@ -344,7 +346,11 @@ fn write_page(
         outcome: Some(outcome),
         back: None,
     };
-    let options = PageOptions::large(arguments.resources.max_memory / 6);
+    let share_bytes = arguments.resources.max_memory / 6;
+    let threads = arguments.resources.limits().threads;
+    let wants_map = arguments.result.settings().deviation;
+    let map = wants_map.then_some(MapOptions { threads, share_bytes });
+    let options = PageOptions { map, ..PageOptions::large(share_bytes) };
     write_model_page(path, &model, &options, &Scratch::new(folder), &Void)
 }
 

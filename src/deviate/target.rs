@@ -7,7 +7,7 @@
 
 use glam::DVec3;
 
-use crate::deviate::nearest::Walker;
+use crate::deviate::nearest::{Near, Walker};
 use crate::deviate::reading::read;
 use crate::deviate::surface::tree_of;
 use crate::deviate::tree::Tree;
@@ -69,7 +69,31 @@ impl Target {
         points: &[[f64; 3]],
         means: &Means<'_>,
     ) -> Result<Vec<f64>, StoreError> {
-        let mut distances = Vec::with_capacity(points.len());
+        let distance =
+            |near: Option<Near>| near.map_or(f64::INFINITY, |near| near.distance_squared.sqrt());
+        self.each_nearest(points, distance, means)
+    }
+
+    /// The point of the surface that is nearest to each of the `points`, in their order.
+    ///
+    /// # Errors
+    /// As for [`Self::distances`].
+    pub fn nearest_points(
+        &self,
+        points: &[[f64; 3]],
+        means: &Means<'_>,
+    ) -> Result<Vec<[f64; 3]>, StoreError> {
+        let point = |near: Option<Near>| near.map_or([f64::NAN; 3], |near| near.point.into());
+        self.each_nearest(points, point, means)
+    }
+
+    fn each_nearest<T: Send>(
+        &self,
+        points: &[[f64; 3]],
+        tell: impl Fn(Option<Near>) -> T + Sync,
+        means: &Means<'_>,
+    ) -> Result<Vec<T>, StoreError> {
+        let mut told = Vec::with_capacity(points.len());
         let mut chunks = points.chunks(CHUNK);
         let share_bytes = means.share_bytes / 8 / means.pool.current_num_threads() as u64;
         ordered(
@@ -80,17 +104,16 @@ impl Target {
             },
             || Walker::new(&self.tree, share_bytes),
             |walker, chunk: &[[f64; 3]]| {
-                let nearest = chunk.iter().map(|point| {
-                    let near = walker.nearest(DVec3::from(*point), DVec3::ZERO)?;
-                    Ok(near.map_or(f64::INFINITY, |near| near.distance_squared.sqrt()))
-                });
-                nearest.collect::<Result<Vec<f64>, StoreError>>()
+                let nearest = chunk
+                    .iter()
+                    .map(|point| walker.nearest(DVec3::from(*point), DVec3::ZERO).map(&tell));
+                nearest.collect::<Result<Vec<T>, StoreError>>()
             },
             |found| {
-                distances.extend(found);
+                told.extend(found);
                 Ok(())
             },
         )?;
-        Ok(distances)
+        Ok(told)
     }
 }

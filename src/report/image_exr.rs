@@ -38,7 +38,7 @@ pub(crate) fn write_exr<E: std::error::Error>(
         let what = "A preview with layers";
         return Err(PreviewError::ShareTooSmall { what, needed_bytes, share_bytes });
     }
-    let ruler = Ruler::read(scene, &Side::ALL, share_bytes / 2)?;
+    let ruler = Ruler::read(scene, (scene.measuring, scene.monitor), &Side::ALL, share_bytes / 2)?;
     let cameras = scene.cameras(options, (width_px, height_px))?;
     let drawing = PreviewOptions { share_bytes: share_bytes / 4, ..*options };
     let texels = Texels { scene, options: &drawing, cameras: &cameras, ruler: ruler.as_ref() };

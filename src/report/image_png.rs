@@ -16,6 +16,7 @@ use crate::report::preview::legend::{Legend, WIDTH_PX};
 use crate::report::preview::map::Map;
 use crate::report::preview::measuring::Ruler;
 use crate::report::preview::panels::{Layout, SEPARATOR_PX, draw_bands};
+use crate::report::preview::scale::Scale;
 use crate::report::preview::scene::Scene;
 use crate::report::preview::shade::{SEPARATOR, to_srgb};
 use crate::report::preview::{PreviewError, PreviewOptions, PreviewStats, Side};
@@ -27,7 +28,12 @@ pub(crate) fn write_png<E: std::error::Error>(
     scene: &Scene<'_, '_, E>,
     options: &PreviewOptions,
 ) -> Result<PreviewStats, PreviewError<E>> {
-    let ruler = Ruler::read(scene, &[Side::Output], options.share_bytes / 2)?;
+    let ruler = Ruler::read(
+        scene,
+        (scene.measuring, scene.monitor),
+        &[Side::Output],
+        options.share_bytes / 2,
+    )?;
     let beside = scene.measuring.as_ref().zip(ruler.as_ref());
     let share_bytes = if beside.is_some() { options.share_bytes / 4 } else { options.share_bytes };
     let drawing = PreviewOptions { share_bytes, ..*options };
@@ -85,7 +91,7 @@ impl<E: std::error::Error> Framed<'_, '_, '_, E> {
         draw_bands(scene, drawing, (layout, &cameras, Some(ruler)), stats, |rows| {
             map.keep(&rows).map_err(PreviewError::measure)
         })?;
-        let scale = map.scale(ruler);
+        let scale = Scale::reaching(map.largest(), ruler.diagonal());
         let legend = Legend::new(&scale, ruler.unit(), layout.height_px);
         stats.width_px = layout.width_px + SEPARATOR_PX + layout.side_px + WIDTH_PX;
         stats.height_px = layout.height_px;

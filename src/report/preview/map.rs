@@ -6,7 +6,6 @@
 //! Fails:      as [`PreviewError`].
 
 use crate::report::preview::PreviewError;
-use crate::report::preview::measuring::Ruler;
 use crate::report::preview::panels::{MapPixel, Rows};
 use crate::report::preview::scale::Scale;
 use crate::report::preview::shade::{BACKGROUND, to_srgb};
@@ -41,11 +40,6 @@ impl Map {
     /// The largest distance so far.
     pub(crate) fn largest(&self) -> f64 {
         f64::from(self.largest)
-    }
-
-    /// The scale that all distances are on.
-    pub(crate) fn scale(&self, ruler: &Ruler) -> Scale {
-        Scale::reaching(self.largest(), ruler.diagonal())
     }
 
     /// Hands out row by row: the pixels of `width_px` before it, and `map_px` of the map.

@@ -28,18 +28,18 @@ impl<'m> Ruler<'m> {
     /// Reads the surfaces that points of `sides` are measured against; `None` where nothing is to be
     /// measured, or where a surface has no area.
     pub(crate) fn read<E: std::error::Error>(
-        scene: &Scene<'m, '_, E>,
+        scene: &Scene<'_, '_, E>,
+        (measuring, monitor): (Option<Measuring<'m>>, &'m dyn Monitor),
         sides: &[Side],
         share_bytes: u64,
     ) -> Result<Option<Self>, PreviewError<E>> {
-        let Some(Measuring { scratch, threads }) = scene.measuring else { return Ok(None) };
+        let Some(Measuring { scratch, threads }) = measuring else { return Ok(None) };
         if scene.output.is_none() {
             return Ok(None);
         }
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|source| PreviewError::Threads { threads, source })?;
-        let mut ruler =
-            Self { scratch, monitor: scene.monitor, pool, share_bytes, others: [None, None] };
+        let mut ruler = Self { scratch, monitor, pool, share_bytes, others: [None, None] };
         for &side in sides {
             let target = ruler.target(scene, other(side))?;
             if target.is_none() {
@@ -74,6 +74,18 @@ impl<'m> Ruler<'m> {
             return Ok(vec![f64::INFINITY; points.len()]);
         };
         target.distances(points, &self.means()).map_err(PreviewError::measure)
+    }
+
+    /// How far what the output has nearest to `points` lies from the input.
+    pub(crate) fn distances_at_output<E: std::error::Error>(
+        &self,
+        points: &[[f64; 3]],
+    ) -> Result<Vec<f64>, PreviewError<E>> {
+        let Some(output) = &self.others[Side::Input as usize] else {
+            return self.distances(Side::Output, points);
+        };
+        let points = output.nearest_points(points, &self.means()).map_err(PreviewError::measure)?;
+        self.distances(Side::Output, &points)
     }
 
     /// Diagonal of the box of the largest surface that was read, model units.

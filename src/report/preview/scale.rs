@@ -74,6 +74,11 @@ pub(crate) fn colour_at(share: f64) -> [u8; 3] {
     })
 }
 
+/// Colours at even steps of every scale, from its lower end to its upper.
+pub(crate) const fn stops() -> &'static [[u8; 3]] {
+    &STOPS
+}
+
 fn number((digit, power): (u8, i32)) -> f64 {
     // As the text is read: a power that is multiplied out would not be round.
     format!("{digit}e{power}").parse().unwrap_or(f64::MAX)
