@@ -158,6 +158,28 @@ def click_model(page):
     demand(page.locator("#viewer output").inner_text() == "before", "the other side is not shown")
     page.locator("#viewer [data-reset]").click()
     page.locator("#viewer [data-side=after]").click()
+    click_deviation(page, canvas)
+
+
+def click_deviation(page, canvas):
+    """Looks at the map of deviations, where the page has one."""
+    if page.locator("#map").count() == 0:
+        return
+    picture = page.locator("#map img")
+    demand(picture.evaluate("(image) => image.complete && image.naturalWidth > 0"), "no map is shown")
+    marks = page.locator("#map .marks span").all_inner_texts()
+    demand(len(marks) == 4 and sorted(marks, key=float) == marks, f"the scale says {marks}")
+    scale = page.locator("#viewer .scale")
+    demand(not scale.is_visible(), "there is a scale for what is not on it")
+    canvas.scroll_into_view_if_needed()
+    page.wait_for_timeout(100)
+    plain = canvas.screenshot()
+    page.locator("#viewer [data-side=deviation]").click()
+    page.wait_for_timeout(150)
+    demand(page.locator("#viewer output").inner_text() == "deviation", "the map is not told")
+    demand(scale.is_visible(), "the map has no scale")
+    canvas.scroll_into_view_if_needed()
+    demand(canvas.screenshot() != plain, "the map has the colours of the model")
 
 
 def open_page(browser, path, click, shots, kind):

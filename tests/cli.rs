@@ -299,6 +299,16 @@ fn a_preview_is_a_png_and_a_work_folder_elsewhere_is_left_empty() {
     assert_eq!(code, 0, "{err}");
     let bytes = std::fs::read(&picture).expect("the picture is there");
     assert!(bytes.starts_with(b"\x89PNG\r\n\x1a\n"));
+    let width = |bytes: &[u8]| u32::from_be_bytes(bytes[16..20].try_into().expect("four bytes"));
+    let with_map = width(&bytes);
+    let (code, ..) = repair(
+        &model(CUBE),
+        &folder.path().join("out.stl"),
+        &[&extra[..], &["--no-deviation"]].concat(),
+    );
+    assert_eq!(code, 0);
+    let plain = width(&std::fs::read(&picture).expect("the picture is there"));
+    assert!(with_map > plain + 900 && plain == 1804, "{with_map} {plain}");
     assert!(names_in(&work).is_empty());
     assert_eq!(names_in(folder.path()), ["out.png", "out.stl", "work"]);
 }

@@ -258,6 +258,24 @@ fn the_page_of_one_repair_holds_all_that_it_shows() {
     assert!(page.addresses().iter().all(|address| address.starts_with("data:")), "alone");
     assert_eq!(page.all("h1").next().expect("a heading").text, "<b>ball&.obj");
     assert_eq!(page.card("Depth"), "6");
+    assert_eq!(page.all("img").count(), 3, "before, after, and the map");
+    let meshes = page.data("meshes");
+    let bytes = |text: &serde_json::Value| {
+        let text = text.as_str().expect("base64");
+        text.len() / 4 * 3 - text.bytes().rev().take_while(|byte| *byte == b'=').count()
+    };
+    let vertices = bytes(&meshes["after"]["vertices"]) / 6;
+    assert!(vertices > 50, "{vertices} vertices");
+    assert_eq!(bytes(&meshes["deviation"]), vertices, "each vertex has a place on the scale");
+    let marks: Vec<f64> = page.all("span").filter_map(|mark| mark.text.parse().ok()).collect();
+    assert_eq!(marks.len(), 8, "a scale of four numbers, twice");
+    assert!(marks[..4].is_sorted() && marks[0] > 0.0, "{marks:?}");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_brickmend"));
+    command.arg("repair").arg(&input).arg("-o").arg(&output).arg("--report").arg(&path);
+    assert_eq!(code_of(command.args(["--depth", "6", "-q", "--no-deviation"])), 0);
+    let page = Page::read(&path);
+    assert_eq!(page.all("img").count(), 2, "no map where nothing is measured");
+    assert!(page.data("meshes").get("deviation").is_none());
 }
 
 #[test]
@@ -293,10 +311,18 @@ fn a_person_can_use_the_pages() {
     let library = Library::hostile();
     library.batch(&[]);
     let model = library.results().join(".brickmend/report/models/3.html");
+    // The page of one repair has a map, those of a batch have none.
+    let alone = library.folder.path().join("alone.html");
+    let mut command = Command::new(env!("CARGO_BIN_EXE_brickmend"));
+    command.arg("repair").arg(library.models().join("b/sound.off")).args(["--depth", "5", "-q"]);
+    command.arg("-o").arg(library.folder.path().join("alone.ply")).arg("--report").arg(&alone);
+    assert_eq!(code_of(&mut command), 0);
     let python = std::env::var("BRICKMEND_PYTHON").unwrap_or_else(|_| "python3".to_owned());
     let script = Path::new(env!("CARGO_MANIFEST_DIR")).join("scripts/click_report.py");
-    let mut command = Command::new(python);
-    command.arg(script).arg("--index").arg(library.index()).arg("--page").arg(model);
-    let run = command.env("BRICKMEND_CHROMIUM", browser).output().expect("python starts");
-    assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    for page in [model, alone] {
+        let mut command = Command::new(&python);
+        command.arg(&script).arg("--index").arg(library.index()).arg("--page").arg(page);
+        let run = command.env("BRICKMEND_CHROMIUM", &browser).output().expect("python starts");
+        assert!(run.status.success(), "{}", String::from_utf8_lossy(&run.stderr));
+    }
 }

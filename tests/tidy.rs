@@ -395,6 +395,7 @@ fn links_in_the_documents_lead_somewhere() {
         "docs/verify.md",
         "docs/journal.md",
         "docs/parts.md",
+        "docs/preview.md",
         "docs/benchmarks/peers.md",
         "docs/glossary.md",
         "docs/journal.md",

@@ -13,6 +13,7 @@ mod last_words;
 mod man;
 mod memory;
 mod numbers;
+mod pictures;
 mod progress;
 mod repair;
 mod report;

@@ -5,22 +5,18 @@ use std::path::{Path, PathBuf};
 use std::process::ExitCode;
 
 use brickmend::catalogue::{Copied, CopyRequest, copy_if_sound};
-use brickmend::io::{Format, ReadOptions, format_of_extension};
-use brickmend::monitor::Void;
+use brickmend::io::{Format, format_of_extension};
 use brickmend::repair::{
     Levels, Limits, Outcome, PartsOutcome, PartsRule, RepairError, SCHEMA_VERSION, Settings,
     Verdict, repair, repair_levels, repair_parts,
 };
-use brickmend::report::{
-    ModelPage, OpenSource, PageOptions, PreviewOptions, ReportError, write_model_page,
-    write_preview,
-};
-use brickmend::store::Scratch;
+use brickmend::report::Views;
 use clap::Args;
 
 use crate::cli::arguments::{ResourceArguments, ResultArguments, parse_size};
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
 use crate::cli::memory::peak_resident_bytes;
+use crate::cli::pictures::{DrawOptions, Pictured, draw_preview, write_page};
 use crate::cli::progress::{Chatter, Progress, on_one_line};
 use crate::cli::signals::Stop;
 
@@ -58,12 +54,18 @@ pub struct RepairArguments {
     /// the parts and of the whole; see docs/outcome.md and docs/parts.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
-    /// Draw input beside output into a PNG or EXR file.
+    /// Draw input, output and a map of deviations into a PNG file, or layers of numbers into an EXR
+    /// file; see docs/preview.md.
     #[arg(long, value_name = "FILE", help_heading = "Report")]
     preview: Option<PathBuf>,
-    /// Write a page of the model: verdict, what was found and done, before and after.
+    /// Write a page of the model: verdict, what was found and done, before and after, and how far the
+    /// output lies from the input.
     #[arg(long, value_name = "FILE.html", help_heading = "Report")]
     report: Option<PathBuf>,
+    /// How many views an EXR file has: 6 along the axes, or 8 more from the corners of a cube.
+    #[arg(long, value_name = "6|14", default_value = "6", requires = "preview", value_parser = ["6", "14"],
+          help_heading = "Report")]
+    preview_views: String,
     /// Draw the edges of the triangles as well.
     #[arg(long, requires = "preview", help_heading = "Report")]
     preview_edges: bool,
@@ -149,9 +151,9 @@ struct CopyOutcome {
 
 /// Tells that the model was copied, draws the preview.
 fn finish_copy(arguments: &RepairArguments, files: Vec<PathBuf>, chatter: &Chatter) -> ExitCode {
-    let mut exit = draw_preview(arguments, chatter).unwrap_or(Exit::Success);
+    let mut exit = drawn(arguments, None, chatter).unwrap_or(Exit::Success);
     if let Some(path) = &arguments.report
-        && let Err(error) = write_page(arguments, None, path)
+        && let Err(error) = write_page(path, &pictured(arguments, None))
     {
         chatter.error(&error);
         exit = Exit::from(error.blame());
@@ -199,7 +201,7 @@ fn run_parts(
         Err(error) => return fail(&error, stop, chatter),
     };
     let exit = if whole.verdict == Verdict::Fail { Exit::NoResult } else { Exit::Success };
-    let exit = draw_preview(arguments, chatter).unwrap_or(exit);
+    let exit = drawn(arguments, None, chatter).unwrap_or(exit);
     whole.stages = progress.stages();
     whole.peak_bytes = peak_resident_bytes();
     if arguments.json {
@@ -277,13 +279,13 @@ fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
 fn finish(arguments: &RepairArguments, outcomes: &mut [Outcome], chatter: &Chatter) -> ExitCode {
     let sound = outcomes.iter().all(|outcome| outcome.verdict != Verdict::Fail);
     let exit = if sound { Exit::Success } else { Exit::NoResult };
-    let mut exit = draw_preview(arguments, chatter).unwrap_or(exit);
+    let mut exit = drawn(arguments, outcomes.first(), chatter).unwrap_or(exit);
     for outcome in outcomes.iter_mut() {
         outcome.memory.peak_bytes = peak_resident_bytes();
     }
     if let Some(path) = &arguments.report
         && let [outcome] = &*outcomes
-        && let Err(error) = write_page(arguments, Some(outcome), path)
+        && let Err(error) = write_page(path, &pictured(arguments, Some(outcome)))
     {
         chatter.error(&error);
         exit = Exit::from(error.blame());
@@ -327,50 +329,32 @@ fn summary(outcome: &Outcome) -> String {
 }
 
 /// Draws the preview, if one is wanted; how the process ends where that fails.
-fn draw_preview(arguments: &RepairArguments, chatter: &Chatter) -> Option<Exit> {
+fn drawn(
+    arguments: &RepairArguments,
+    outcome: Option<&Outcome>,
+    chatter: &Chatter,
+) -> Option<Exit> {
     let path = arguments.preview.as_ref()?;
-    let error = draw(arguments, path).err()?;
+    let options = DrawOptions {
+        has_edges: arguments.preview_edges,
+        views: if arguments.preview_views == "14" { Views::Fourteen } else { Views::Six },
+    };
+    let error = draw_preview(path, &pictured(arguments, outcome), &options).err()?;
     chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));
     Some(Exit::Unusable)
 }
 
-/// Draws input beside output; a sixth of the memory budget is for the bands.
-fn draw(arguments: &RepairArguments, path: &Path) -> Result<(), String> {
-    let scratch =
-        Scratch::new(path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new(".")));
-    let share_bytes = arguments.resources.max_memory / 6;
-    let options = ReadOptions::in_scene(share_bytes);
-    let open = |path: &Path| -> Result<Box<dyn brickmend::mesh::MeshSource<Error = _>>, _> {
-        let source = brickmend::io::open(path, &scratch, &options)?;
-        Ok(source as Box<dyn brickmend::mesh::MeshSource<Error = _>>)
-    };
-    let input: &OpenSource<brickmend::io::IoError> = &|| open(&arguments.input);
-    let output: &OpenSource<brickmend::io::IoError> = &|| open(&arguments.output);
-    let options =
-        PreviewOptions { share_bytes, edges: arguments.preview_edges, ..PreviewOptions::default() };
-    write_preview(path, input, Some(output), &options, &Void)
-        .map(|_| ())
-        .map_err(|error| error.to_string())
-}
-
-/// Writes the page of the model; a sixth of the memory budget is for pictures and meshes.
-fn write_page(
-    arguments: &RepairArguments,
-    outcome: Option<&Outcome>,
-    path: &Path,
-) -> Result<(), ReportError> {
-    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let name = arguments.input.file_name().unwrap_or_default().to_string_lossy();
-    let model = ModelPage {
-        name: &name,
+fn pictured<'a>(arguments: &'a RepairArguments, outcome: Option<&'a Outcome>) -> Pictured<'a> {
+    let settings = arguments.result.settings();
+    Pictured {
         input: &arguments.input,
         output: &arguments.output,
         outcome,
-        parts: None,
-        back: None,
-    };
-    let options = PageOptions::large(arguments.resources.max_memory / 6);
-    write_model_page(path, &model, &options, &Scratch::new(folder), &Void)
+        limits: arguments.resources.limits(),
+        share_bytes: arguments.resources.max_memory / 6,
+        is_measured: settings.deviation,
+        tags_patches: settings.tag_patches,
+    }
 }
 
 /// A refusal of the command line's own.

@@ -3,7 +3,8 @@
 //!
 //! In:         two surfaces as [`MeshSource`]s, each read once into a [`Surface`]: triangles in a
 //!             tree of boxes, samples spread evenly over their area, and their sharp edges.
-//! Out:        a [`Deviation`]: distances both ways, normals, what is lost and invented, creases.
+//! Out:        a [`Deviation`]: distances both ways, normals, what is lost and invented, creases. Or, of a
+//!             [`Target`], the distance of whatever points are asked for.
 //! Invariant:  depends on the two files and the [`DeviationOptions`] alone: not on the share, and
 //!             not on threads. The distance of a sample is that to the nearest of all triangles.
 //! Units:      model units, the same in both files; angles in degrees.
@@ -28,6 +29,7 @@ mod reading;
 mod samples;
 mod sight;
 mod surface;
+mod target;
 #[cfg(test)]
 mod tests;
 mod tree;
@@ -37,6 +39,7 @@ pub use deviation::{CreaseReport, Deviation, Distances, LostReport, Normals, Sep
 pub use error::DeviateError;
 pub use parts::PartsSeen;
 pub use surface::{Surface, SurfaceOptions};
+pub use target::Target;
 
 use rayon::ThreadPool;
 

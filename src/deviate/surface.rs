@@ -3,12 +3,12 @@
 //! Memory: half of the share while it is read, a quarter as it stays.
 
 use crate::deviate::creases::{Creases, find_creases};
-use crate::deviate::reading::{BLOCK, read};
+use crate::deviate::reading::{BLOCK, Tape, read};
 use crate::deviate::samples::{Sample, take_samples};
 use crate::deviate::tree::{Tree, TreeBuilder};
 use crate::deviate::{DeviateError, Means};
 use crate::mesh::MeshSource;
-use crate::store::Sequence;
+use crate::store::{Sequence, StoreError};
 
 /// What is asked of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -48,17 +48,25 @@ impl Surface {
         let bounds = tape.bounds;
         let samples = take_samples(&tape, options.samples, means)?;
         let creases = options.creases.then(|| find_creases(&tape, means)).transpose()?;
-        let tree = if options.is_coherent {
-            Tree::around(tape.triangles, bounds, means)?
-        } else {
-            let mut builder = TreeBuilder::new(bounds, means);
-            tape.triangles.each_block(BLOCK, |block| {
-                means.stop_if_asked()?;
-                block.iter().try_for_each(|triangle| builder.add(*triangle))
-            })?;
-            drop(tape);
-            builder.finish()?
-        };
+        let tree = tree_of(tape, options.is_coherent, means)?;
         Ok(Some(Self { bounds, tree, samples, creases }))
     }
+}
+
+/// A tree around what was read; `is_coherent` as in [`SurfaceOptions`].
+pub(crate) fn tree_of(
+    tape: Tape,
+    is_coherent: bool,
+    means: &Means<'_>,
+) -> Result<Tree, StoreError> {
+    if is_coherent {
+        return Tree::around(tape.triangles, tape.bounds, means);
+    }
+    let mut builder = TreeBuilder::new(tape.bounds, means);
+    tape.triangles.each_block(BLOCK, |block| {
+        means.stop_if_asked()?;
+        block.iter().try_for_each(|triangle| builder.add(*triangle))
+    })?;
+    drop(tape);
+    builder.finish()
 }

@@ -7,7 +7,7 @@ use crate::deviate::nearest::near_on;
 use crate::deviate::reading::Triangle;
 use crate::deviate::samples::Sample;
 use crate::deviate::{
-    CreaseReport, Deviation, DeviationOptions, Means, Surface, SurfaceOptions, compare,
+    CreaseReport, Deviation, DeviationOptions, Means, Surface, SurfaceOptions, Target, compare,
 };
 use crate::mesh::shapes::{
     Corners, ListedTriangles, Random, cuboid, rotation, sphere, torus, transform,
@@ -125,6 +125,33 @@ fn distances_are_those_of_brute_force_whatever_the_share_and_the_threads() {
         }
         let unsorted = Workshop { is_coherent: true, ..Workshop::new(2, SMALL) };
         assert_eq!(unsorted.compare(&one, &other, &options), found);
+    }
+}
+
+#[test]
+fn points_are_measured_as_by_brute_force_whatever_the_share_and_the_threads() {
+    let mut random = Random::new(7);
+    let triangles = soup(&mut random, 700);
+    let points: Vec<[f64; 3]> =
+        (0..3000).map(|_| random.point().map(|part| 2.0 * part - 0.5)).collect();
+    let expected = points.iter().map(|point| {
+        let distances = triangles.iter().map(|&corners| {
+            let triangle = Triangle { corners, number: 0, is_pane: 0 };
+            let near = near_on(DVec3::from(*point), DVec3::ZERO, &triangle, f64::INFINITY);
+            near.expect("nothing is too far").distance_squared
+        });
+        distances.fold(f64::INFINITY, f64::min).sqrt()
+    });
+    let expected: Vec<f64> = expected.collect();
+    for (threads, share_bytes) in [(1, LARGE), (1, SMALL), (4, SMALL)] {
+        for is_coherent in [false, true] {
+            let workshop = Workshop::new(threads, share_bytes);
+            let mut source = ListedTriangles::without_indices(triangles.clone());
+            let target = Target::read(&mut source, is_coherent, &workshop.means());
+            let target = target.expect("the scratch disk works").expect("it has an area");
+            let found = target.distances(&points, &workshop.means());
+            assert!(found.expect("the scratch disk works") == expected);
+        }
     }
 }
 

@@ -1,17 +1,17 @@
-//! The EXR: layers `input` and `output` with colour, depth, normal and part, for measuring.
+//! The EXR: a layer for each view of the input and of the output, for measuring.
 //!
-//! In:         a [`Scene`]; one sample per pixel, because depths and numbers cannot be averaged.
-//! Out:        two layers of `columns x width` by `rows x height`, channels R G B (linear light),
-//!             Z (model units from the near end of the view; infinite where nothing is),
-//!             normal.X normal.Y normal.Z (unit, model space) and part (u32, [`NO_PART`] if none).
-//! Invariant:  both layers are seen by the same cameras.
-//! Memory:     both layers whole, inside the share.
+//! In:         a [`Scene`].
+//! Out:        layers `input.VIEW` and `output.VIEW`, channels R G B (linear light), Z, normal.X, normal.Y,
+//!             normal.Z, part, material, patch and deviation, as docs/preview.md tells them.
+//! Invariant:  both sides are seen by the same cameras; the same pixels whatever share and threads.
+//! Memory:     the share: half for measuring, a quarter for bands, a quarter for texels that wait; beyond
+//!             that they lie in a scratch file without a name. The compressor has blocks of 32 rows.
 //! Fails:      as [`PreviewError`].
 
 use std::borrow::Cow;
 use std::io::{self, BufWriter, Write};
-use std::mem::size_of;
 use std::path::Path;
+use std::sync::{Mutex, PoisonError};
 
 use exr::prelude::{
     Encoding, Image, ImageAttributes, IntegerBounds, Layer, LayerAttributes, SpecificChannels,
@@ -19,111 +19,122 @@ use exr::prelude::{
 };
 
 use crate::report::image_staged::StagedFile;
-use crate::report::preview::camera::{Camera, Grid};
-use crate::report::preview::raster::{Band, Sample};
-use crate::report::preview::scene::{Face, Painter, Scene};
-use crate::report::preview::shade::BACKGROUND;
-use crate::report::preview::{PreviewError, PreviewOptions, PreviewStats, Side, SideStats};
+use crate::report::preview::camera::names_of;
+use crate::report::preview::measuring::Ruler;
+use crate::report::preview::scene::Scene;
+use crate::report::preview::texels::{Texel, Texels, row_bytes};
+use crate::report::preview::{PreviewError, PreviewOptions, PreviewStats, Side};
+use crate::store::{Scratch, Sequence, StoreError};
 
-/// The part of a pixel that shows nothing.
-pub(crate) const NO_PART: u32 = u32::MAX;
-/// Width of the lines along edges, half a pixel on each side of the edge.
-const LINE_SAMPLES: f64 = 0.5;
-
-/// What a pixel of a layer holds beside its depth.
-#[derive(Clone, Copy)]
-struct Texel {
-    colour: [f32; 3],
-    normal: [f32; 3],
-    part: u32,
-}
-
-const NOTHING: Texel = Texel { colour: BACKGROUND, normal: [0.0; 3], part: NO_PART };
-
-impl Texel {
-    fn of(face: &Face) -> Self {
-        Self { colour: face.colour, normal: face.normal.as_vec3().to_array(), part: face.part }
-    }
-}
-
-/// All views of one side.
-struct LayerViews {
-    views: Vec<(Camera, Band<Texel>)>,
-    grid: Grid,
-    height: usize,
-    width: usize,
-}
-
-/// The values of one pixel, in the order of the channels.
-type Pixel = (f32, f32, f32, f32, f32, f32, f32, u32);
-
-impl LayerViews {
-    fn pixel(&self, Vec2(x, y): Vec2<usize>) -> Pixel {
-        let index = y / self.height * self.grid.columns as usize + x / self.width;
-        let (camera, band) = &self.views[index];
-        let sample = band.samples[y % self.height * self.width + x % self.width];
-        let depth_world = camera.distance_world(sample.depth);
-        let Texel { colour: [r, g, b], normal: [nx, ny, nz], part } = sample.paint;
-        (r, g, b, depth_world, nx, ny, nz, part)
-    }
-}
-
-/// Writes both layers.
+/// Writes all layers.
 pub(crate) fn write_exr<E: std::error::Error>(
     path: &Path,
     scene: &Scene<'_, '_, E>,
     options: &PreviewOptions,
 ) -> Result<PreviewStats, PreviewError<E>> {
-    let grid = Grid::of(options.views);
-    let (width_px, height_px) = (grid.columns * options.width_px, grid.rows * options.height_px);
-    let texels = 2 * u64::from(width_px) * u64::from(height_px);
-    let needed_bytes = texels * size_of::<Sample<Texel>>() as u64;
-    let share_bytes = options.share_bytes;
+    let PreviewOptions { width_px, height_px, share_bytes, .. } = *options;
+    let needed_bytes = 4 * row_bytes(options);
     if needed_bytes > share_bytes {
         let what = "A preview with layers";
         return Err(PreviewError::ShareTooSmall { what, needed_bytes, share_bytes });
     }
-    let cameras = scene.cameras(options, (options.width_px, options.height_px))?;
-    let (input, input_stats) = draw_layer(scene, Side::Input, options, &cameras)?;
-    let (output, output_stats) = draw_layer(scene, Side::Output, options, &cameras)?;
+    let ruler = Ruler::read(scene, (scene.measuring, scene.monitor), &Side::ALL, share_bytes / 2)?;
+    let cameras = scene.cameras(options, (width_px, height_px))?;
+    let drawing = PreviewOptions { share_bytes: share_bytes / 4, ..*options };
+    let texels = Texels { scene, options: &drawing, cameras: &cameras, ruler: ruler.as_ref() };
+    let beside = Scratch::new(folder_of(path));
+    let scratch = scene.measuring.map_or(&beside, |measuring| measuring.scratch);
+    let mut sequence = Sequence::new(scratch, share_bytes / 4);
+    let (input, input_bands) = texels.draw(Side::Input, &mut sequence)?;
+    let (output, output_bands) = texels.draw(Side::Output, &mut sequence)?;
     let staged = StagedFile::create(path)?;
     let mut file = BufWriter::new(staged.file());
     let size = Vec2(width_px as usize, height_px as usize);
-    encode(&mut file, size, &input, &output).map_err(|source| staged.failed(source))?;
+    let rows = Rows::new(&sequence, size.0);
+    encode(&mut file, size, options, &rows).map_err(|source| staged.failed(source))?;
+    rows.end().map_err(PreviewError::measure)?;
     drop(file);
     Ok(PreviewStats {
         width_px,
         height_px,
-        bands: 1,
-        input: input_stats,
-        output: output_stats,
+        bands: input_bands + output_bands,
+        input,
+        output,
+        largest_deviation: None,
         bytes: staged.put_in_place()?,
     })
 }
 
-fn draw_layer<E: std::error::Error>(
-    scene: &Scene<'_, '_, E>,
-    side: Side,
-    options: &PreviewOptions,
-    cameras: &[Camera],
-) -> Result<(LayerViews, SideStats), PreviewError<E>> {
-    let grid = Grid::of(options.views);
-    let (width, height) = (options.width_px as usize, options.height_px as usize);
-    let empty = |&camera| (camera, Band::new(width, height, NOTHING));
-    let mut views: Vec<_> = cameras.iter().map(empty).collect();
-    let painter = Painter { paint: Texel::of, line_width: options.edges.then_some(LINE_SAMPLES) };
-    let stats = scene.draw(side, &mut views, &painter)?;
-    Ok((LayerViews { views, grid, height, width }, stats))
+fn folder_of(path: &Path) -> &Path {
+    path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
+
+/// The values of one pixel, in the order of the channels.
+type Pixel = (f32, f32, f32, f32, f32, f32, f32, f32, u32, u32, u32);
+
+/// Rows of texels for an encoder that asks for pixels, and cannot be told of a disk that fails.
+struct Rows<'r> {
+    texels: &'r Sequence<Texel>,
+    width: usize,
+    held: Mutex<Held>,
+}
+
+struct Held {
+    /// The number of a row over all layers, and its texels.
+    row: u64,
+    texels: Vec<Texel>,
+    room: Vec<Texel>,
+    failure: Option<StoreError>,
+}
+
+impl<'r> Rows<'r> {
+    fn new(texels: &'r Sequence<Texel>, width: usize) -> Self {
+        let held = Held { row: u64::MAX, texels: Vec::new(), room: Vec::new(), failure: None };
+        Self { texels, width, held: Mutex::new(held) }
+    }
+
+    fn pixel(&self, x: usize, row: u64) -> Pixel {
+        let mut held = self.held.lock().unwrap_or_else(PoisonError::into_inner);
+        if held.row != row && held.failure.is_none() {
+            let result = held.read(self.texels, row, self.width);
+            held.failure = result.err();
+        }
+        let texel = held.texels.get(x).copied().unwrap_or(bytemuck::Zeroable::zeroed());
+        let Texel { colour: [r, g, b], normal: [nx, ny, nz], depth, deviation, .. } = texel;
+        (r, g, b, depth, nx, ny, nz, deviation, texel.part, texel.material, texel.patch)
+    }
+
+    /// What the disk said.
+    fn end(self) -> Result<(), StoreError> {
+        let held = self.held.into_inner().unwrap_or_else(PoisonError::into_inner);
+        held.failure.map_or(Ok(()), Err)
+    }
+}
+
+impl Held {
+    fn read(&mut self, texels: &Sequence<Texel>, row: u64, width: usize) -> Result<(), StoreError> {
+        self.texels.clear();
+        while self.texels.len() < width {
+            let (start, left) = (row * width as u64, width - self.texels.len());
+            let at = start + self.texels.len() as u64;
+            self.texels.extend_from_slice(texels.block(at, left, &mut self.room)?);
+        }
+        self.row = row;
+        Ok(())
+    }
 }
 
 fn encode(
     mut file: impl Write + io::Seek,
     size: Vec2<usize>,
-    input: &LayerViews,
-    output: &LayerViews,
+    options: &PreviewOptions,
+    rows: &Rows,
 ) -> io::Result<()> {
-    // The channels stand in the order of `Pixel`; the crate sorts them by name.
-    let layer = |side: Side, views| {
+    let names =
+        Side::ALL.into_iter().flat_map(|side| names_of(options.views).map(move |v| (side, v)));
+    let layers = names.zip(0_u64..).map(|((side, view), number)| {
+        let first = number * size.1 as u64;
+        // The channels stand in the order of `Pixel`; the crate sorts them by name.
         let channels = SpecificChannels::build()
             .with_channel::<f32>("R")
             .with_channel::<f32>("G")
@@ -132,13 +143,16 @@ fn encode(
             .with_channel::<f32>("normal.X")
             .with_channel::<f32>("normal.Y")
             .with_channel::<f32>("normal.Z")
+            .with_channel::<f32>("deviation")
             .with_channel::<u32>("part")
-            .with_pixel_fn(move |at| LayerViews::pixel(views, at));
-        Layer::new(size, LayerAttributes::named(side.name()), Encoding::SMALL_LOSSLESS, channels)
-    };
-    let image = Image::empty(ImageAttributes::new(IntegerBounds::from_dimensions(size)))
-        .with_layer(layer(Side::Input, input))
-        .with_layer(layer(Side::Output, output));
+            .with_channel::<u32>("material")
+            .with_channel::<u32>("patch")
+            .with_pixel_fn(move |Vec2(x, y): Vec2<usize>| rows.pixel(x, first + y as u64));
+        let name = format!("{}.{view}", side.name());
+        Layer::new(size, LayerAttributes::named(name.as_str()), Encoding::SMALL_LOSSLESS, channels)
+    });
+    let attributes = ImageAttributes::new(IntegerBounds::from_dimensions(size));
+    let image = Image::from_layers(attributes, layers.collect::<Vec<_>>());
     image.write().to_buffered(&mut file).map_err(|error| match error {
         exr::error::Error::Io(error) => error,
         exr::error::Error::NotSupported(text) | exr::error::Error::Invalid(text) => other(text),

@@ -13,7 +13,7 @@ use std::collections::{HashMap, HashSet};
 
 use glam::DVec3;
 
-use crate::mesh::{Discarded, MeshSource, TriangleBatch};
+use crate::mesh::{Discarded, LengthUnit, Material, MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::report::preview::{OpenSource, PreviewError, Side};
 
@@ -84,6 +84,11 @@ impl Cube {
         let middle = lo * 0.5 + hi * 0.5;
         let side = 1.25 * length;
         Some(Self { lo: middle - DVec3::splat(0.5 * side), side })
+    }
+
+    /// The place of so many steps.
+    pub(crate) fn place(&self, steps: [u16; 3]) -> [f64; 3] {
+        (self.lo + DVec3::from(steps.map(f64::from)) / STEPS * self.side).into()
     }
 
     /// The steps of a place; `None` outside of the cube.
@@ -160,6 +165,12 @@ impl<E: std::error::Error> MeshSource for Overheard<'_, E> {
             self.lightening.borrow_mut().hear(batch);
         }
         Ok(is_more)
+    }
+    fn material(&mut self, number: u32) -> Result<Material, E> {
+        self.source.material(number)
+    }
+    fn unit(&self) -> Option<LengthUnit> {
+        self.source.unit()
     }
     fn discarded(&self) -> Discarded {
         self.source.discarded()

@@ -18,8 +18,8 @@ pub mod preview;
 
 pub use catalogue_page::{FOLDER, INDEX, report_folder, write_catalogue_page};
 pub use error::ReportError;
-pub use model_page::{Gallery, ModelPage, PageOptions, PartsPage, write_model_page};
+pub use model_page::{Gallery, MapOptions, ModelPage, PageOptions, PartsPage, write_model_page};
 pub use preview::{
-    OpenSource, PreviewError, PreviewOptions, PreviewStats, Side, SideStats, UpAxis, Views,
-    write_preview,
+    Measuring, OpenSource, PatchRule, PreviewError, PreviewOptions, PreviewStats, Scene, Side,
+    SideStats, UpAxis, Views, write_preview,
 };

@@ -1,12 +1,15 @@
 //! Input and output as two pictures of one camera, in memory.
 //!
-//! In:         a [`Scene`]. Out: two [`Picture`]s of the same size.
-//! Memory:     both pictures; the bands take what is left of the share.
+//! In:         a [`Scene`]. Out: two [`Picture`]s of the same size, and a third one of the map.
+//! Memory:     the pictures; the bands take what is left of the share.
 //! Fails:      as [`PreviewError`].
 
 use std::io;
 
-use crate::report::image_png::{Layout, SEPARATOR_PX, draw_bands};
+use crate::report::preview::map::Map;
+use crate::report::preview::measuring::Ruler;
+use crate::report::preview::panels::{Layout, Rows, draw_bands};
+use crate::report::preview::scale::Scale;
 use crate::report::preview::scene::Scene;
 use crate::report::preview::{PreviewError, PreviewOptions, PreviewStats};
 
@@ -20,31 +23,50 @@ pub(crate) struct Picture {
     pub(crate) bytes: Vec<u8>,
 }
 
-/// Draws both sides.
+/// Draws both sides, and what a map needs where there is a `ruler`.
 pub(crate) fn draw_pair<E: std::error::Error>(
     scene: &Scene<'_, '_, E>,
     options: &PreviewOptions,
-) -> Result<[Picture; 2], PreviewError<E>> {
+    ruler: Option<&Ruler>,
+) -> Result<([Picture; 2], Option<Map>), PreviewError<E>> {
     let held = 6 * u64::from(options.width_px) * u64::from(options.height_px);
     let share_bytes = options.share_bytes.saturating_sub(held);
     let options = PreviewOptions { share_bytes, ..*options };
-    let layout = Layout::new(&options)?;
+    let layout = Layout::new(&options, ruler.is_some())?;
     let size = Layout::samples_of_view(&options);
     let cameras = scene.cameras(&options, size)?;
-    let side_px = (layout.width_px - SEPARATOR_PX) / 2;
+    let side_px = layout.side_px;
     let empty = || Picture { width_px: side_px, height_px: layout.height_px, bytes: Vec::new() };
     let mut pair = [empty(), empty()];
+    let measuring = scene.measuring.filter(|_| ruler.is_some());
+    let mut map = measuring.map(|measuring| Map::new(measuring.scratch, share_bytes));
     let row_bytes = 3 * layout.width_px as usize;
     let mut stats = PreviewStats::default();
-    draw_bands(scene, &options, &layout, &cameras, &mut stats, |rows| {
-        for row in rows.chunks_exact(row_bytes) {
+    draw_bands(scene, &options, (&layout, &cameras, ruler), &mut stats, |rows| {
+        for row in rows.pixels.chunks_exact(row_bytes) {
             let side_bytes = 3 * side_px as usize;
             pair[0].bytes.extend_from_slice(&row[..side_bytes]);
             pair[1].bytes.extend_from_slice(&row[row_bytes - side_bytes..]);
         }
+        let of_map = Rows { pixels: &[], map: rows.map };
+        map.as_mut().map_or(Ok(()), |map| map.keep(&of_map)).map_err(PreviewError::measure)
+    })?;
+    Ok((pair, map))
+}
+
+/// A map as a picture as wide as the others.
+pub(crate) fn colour_map<E: std::error::Error>(
+    map: &Map,
+    scale: &Scale,
+    width_px: u32,
+) -> Result<Picture, PreviewError<E>> {
+    let mut picture = Picture { width_px, height_px: 0, bytes: Vec::new() };
+    map.each_row(scale, (0, width_px), |_, coloured| {
+        picture.height_px += 1;
+        picture.bytes.extend_from_slice(coloured.as_flattened());
         Ok(())
     })?;
-    Ok(pair)
+    Ok(picture)
 }
 
 impl Picture {

@@ -7,7 +7,10 @@ use base64::write::EncoderWriter;
 
 use crate::report::html::{Markup, count};
 use crate::report::light_mesh::LightMesh;
+use crate::report::model_page::ShownMap;
 use crate::report::pictures::Picture;
+use crate::report::preview::legend::word;
+use crate::report::preview::scale::stops;
 
 /// Writes both pictures, which the script lays upon each other.
 pub(crate) fn write_pictures(html: &mut Markup, pictures: &[Picture; 2]) -> io::Result<()> {
@@ -54,8 +57,41 @@ fn write_base64(html: &mut Markup, bytes: &[u8]) -> io::Result<()> {
     encoder.finish().map(|_| ())
 }
 
+/// Writes the map of deviations and its scale.
+pub(crate) fn write_map(html: &mut Markup, map: &ShownMap) -> io::Result<()> {
+    html.element("section", &[("id", "map")], |html| {
+        html.leaf("h2", &[], "How far it lies from the input")?;
+        html.element("figure", &[("class", "map")], |html| {
+            write_picture(html, &map.picture, "deviation")?;
+            html.element("figcaption", &[], |html| write_scale(html, map))
+        })?;
+        let text = "The result once more: from each point of it to the nearest of the input. Grey has \
+                    stayed where it was; hot is what the input lacks.";
+        html.leaf("p", &[("class", "quiet")], text)
+    })
+}
+
+/// Writes the colours of the scale, and the numbers beneath them, from left to right.
+fn write_scale(html: &mut Markup, map: &ShownMap) -> io::Result<()> {
+    let stops = stops().iter().map(|[r, g, b]| format!(",rgb({r} {g} {b})")).collect::<String>();
+    let style = format!("background:linear-gradient(to right{stops})");
+    html.element("div", &[("class", "scale")], |html| {
+        html.leaf("span", &[("class", "bar"), ("style", &style)], "")?;
+        let mut marks: Vec<_> = map.scale.marks().map(|(_, text)| text).collect();
+        marks.reverse();
+        html.element("span", &[("class", "marks")], |html| {
+            marks.iter().try_for_each(|mark| html.leaf("span", &[], mark))
+        })?;
+        html.leaf("span", &[], &format!("deviation in {}", word(map.unit)))
+    })
+}
+
 /// Writes what turns the meshes.
-pub(crate) fn write_viewer(html: &mut Markup, meshes: &[LightMesh; 2]) -> io::Result<()> {
+pub(crate) fn write_viewer(
+    html: &mut Markup,
+    meshes: &[LightMesh; 2],
+    map: Option<&ShownMap>,
+) -> io::Result<()> {
     html.element("section", &[("class", "script-only")], |html| {
         html.leaf("h2", &[], "Turn it")?;
         html.element("div", &[("class", "viewer"), ("id", "viewer")], |html| {
@@ -65,16 +101,25 @@ pub(crate) fn write_viewer(html: &mut Markup, meshes: &[LightMesh; 2]) -> io::Re
             html.element("div", &[("class", "controls")], |html| {
                 html.leaf("button", &[("type", "button"), ("data-side", "before")], "Before")?;
                 html.leaf("button", &[("type", "button"), ("data-side", "after")], "After")?;
+                if map.is_some() {
+                    let button = [("type", "button"), ("data-side", "deviation")];
+                    html.leaf("button", &button, "Deviation")?;
+                }
                 html.leaf("button", &[("type", "button"), ("data-reset", "")], "Reset")?;
                 html.leaf("output", &[], "")
-            })
+            })?;
+            map.map_or(Ok(()), |map| write_scale(html, map))
         })?;
         html.leaf("p", &[("class", "quiet")], &note(meshes))
     })
 }
 
 /// Writes the meshes as data for the script.
-pub(crate) fn write_meshes(html: &mut Markup, meshes: &[LightMesh; 2]) -> io::Result<()> {
+pub(crate) fn write_meshes(
+    html: &mut Markup,
+    meshes: &[LightMesh; 2],
+    map: Option<&ShownMap>,
+) -> io::Result<()> {
     html.element("script", &[("type", "application/json"), ("id", "meshes")], |html| {
         html.raw("{")?;
         for (mesh, name) in meshes.iter().zip(["before", "after"]) {
@@ -85,6 +130,11 @@ pub(crate) fn write_meshes(html: &mut Markup, meshes: &[LightMesh; 2]) -> io::Re
             html.raw("\",\"triangles\":\"")?;
             write_numbers(html, &mesh.triangles)?;
             html.raw("\"}")?;
+        }
+        if let Some(map) = map {
+            html.raw(",\"deviation\":\"")?;
+            write_base64(html, &map.vertices)?;
+            html.raw(&format!("\",\"ramp\":{:?}", stops()))?;
         }
         html.raw("}")
     })

@@ -83,7 +83,7 @@ impl Gallery {
         let options = match wanted {
             Pages::None => return Ok(()),
             Pages::Thumbnails => {
-                PageOptions { picture_px: THUMBNAIL_PX, mesh_triangles: 0, share_bytes }
+                PageOptions { picture_px: THUMBNAIL_PX, mesh_triangles: 0, share_bytes, map: None }
             }
             Pages::All => PageOptions::small(share_bytes),
         };

@@ -3,7 +3,8 @@
 //! In:         input and output as files that are in place, and the outcome of the repair.
 //! Out:        one HTML file that holds all it shows; in a batch two small pictures beside it.
 //! Invariant:  readable without script: then both pictures stand side by side, and nothing turns.
-//! Memory:     the share: pictures, light meshes and bands; the readers have as much again.
+//! Memory:     the share: pictures, light meshes and bands; the readers have as much again, and measuring
+//!             deviations has a share of its own.
 //! Fails:      [`ReportError`]; then no page is put in place.
 
 mod carried;
@@ -20,7 +21,7 @@ use std::io::{self, BufWriter, Write};
 use std::path::Path;
 
 use crate::io::{IoError, ReadOptions};
-use crate::mesh::MeshSource;
+use crate::mesh::{LengthUnit, MeshSource};
 use crate::monitor::Monitor;
 use crate::repair::Outcome;
 use crate::report::ReportError;
@@ -28,9 +29,11 @@ use crate::report::error::Halt;
 use crate::report::html::{Frame, write_page};
 use crate::report::image_staged::StagedFile;
 use crate::report::light_mesh::{Cube, Known, LightMesh, Lightening, Overheard};
-use crate::report::pictures::{Picture, draw_pair};
-use crate::report::preview::scene::Scene;
-use crate::report::preview::{OpenSource, PreviewOptions, Side};
+use crate::report::pictures::{Picture, colour_map, draw_pair};
+use crate::report::preview::map::Map;
+use crate::report::preview::measuring::Ruler;
+use crate::report::preview::scale::Scale;
+use crate::report::preview::{Measuring, OpenSource, PreviewError, PreviewOptions, Scene, Side};
 use crate::store::Scratch;
 
 const COMPARE: &str = include_str!("../html/assets/compare.js");
@@ -68,6 +71,17 @@ pub struct PageOptions {
     pub mesh_triangles: usize,
     /// Memory for pictures and meshes; readers take as much again.
     pub share_bytes: u64,
+    /// How deviations are measured; there is no map if `None`.
+    pub map: Option<MapOptions>,
+}
+
+/// What measuring deviations for a page may use.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct MapOptions {
+    /// Threads that measure; they change no number.
+    pub threads: usize,
+    /// Memory.
+    pub share_bytes: u64,
 }
 
 impl PageOptions {
@@ -85,13 +99,15 @@ impl PageOptions {
 
     /// Half of the share is for the pictures at most, half for the meshes.
     fn within(share_bytes: u64, picture_px: u32, mesh_triangles: u64) -> Self {
-        let pair_bytes = |px: u32| 6 * u64::from(px) * u64::from(px);
+        // Both pictures, and that of a map.
+        let pair_bytes = |px: u32| 9 * u64::from(px) * u64::from(px);
         let mut picture_px = picture_px;
         while picture_px > LEAST_PX && 2 * pair_bytes(picture_px) > share_bytes {
             picture_px /= 2;
         }
         let most = share_bytes / (4 * TRIANGLE_BYTES);
-        Self { picture_px, mesh_triangles: mesh_triangles.min(most) as usize, share_bytes }
+        let mesh_triangles = mesh_triangles.min(most) as usize;
+        Self { picture_px, mesh_triangles, share_bytes, map: None }
     }
 }
 
@@ -100,6 +116,16 @@ struct Shown {
     pictures: [Picture; 2],
     has_meshes: bool,
     meshes: [LightMesh; 2],
+    map: Option<ShownMap>,
+}
+
+/// A map of deviations.
+struct ShownMap {
+    picture: Picture,
+    scale: Scale,
+    unit: Option<LengthUnit>,
+    /// How far up the scale the vertices of the light mesh are, of 255.
+    vertices: Vec<u8>,
 }
 
 /// Writes the page of a model to `path`. Readers spill into the folder of `scratch`.
@@ -149,16 +175,43 @@ fn look(
         })
     };
     let (width_px, height_px) = (options.picture_px, options.picture_px);
-    let preview = PreviewOptions { width_px, height_px, share_bytes, ..PreviewOptions::default() };
-    let pictures = {
+    let creases = options.mesh_triangles > 0;
+    let preview =
+        PreviewOptions { width_px, height_px, share_bytes, creases, ..PreviewOptions::default() };
+    let measuring = options.map.map(|MapOptions { threads, .. }| Measuring { scratch, threads });
+    let (pictures, ruler, map) = {
         let input: &OpenSource<IoError> = &|| overhear(0, model.input);
         let output: &OpenSource<IoError> = &|| overhear(1, model.output);
-        draw_pair(&Scene { input, output: Some(output), monitor }, &preview)?
+        let scene = Scene { input, output: Some(output), measuring, monitor };
+        let map_bytes = options.map.map_or(0, |map| map.share_bytes);
+        let ruler = Ruler::read(&scene, (measuring, monitor), &Side::ALL, map_bytes)?;
+        let (pictures, map) = draw_pair(&scene, &preview, ruler.as_ref())?;
+        (pictures, ruler, map)
     };
     let meshes = lightenings.map(|lightening| {
         lightening.map_or_else(LightMesh::default, |lightening| lightening.into_inner().finish())
     });
-    Ok(Shown { pictures, has_meshes: cube.is_some(), meshes })
+    let map = match ruler.zip(map) {
+        Some((ruler, map)) => Some(colour(&ruler, &map, (cube, &meshes[1]), width_px)?),
+        None => None,
+    };
+    Ok(Shown { pictures, has_meshes: cube.is_some(), meshes, map })
+}
+
+/// Puts a picture and the vertices of the light mesh on one scale.
+fn colour(
+    ruler: &Ruler,
+    map: &Map,
+    (cube, mesh): (Option<Cube>, &LightMesh),
+    width_px: u32,
+) -> Result<ShownMap, PreviewError<IoError>> {
+    let places = mesh.vertices.iter().filter_map(|&steps| Some(cube?.place(steps)));
+    let distances = ruler.distances_at_output(&places.collect::<Vec<_>>())?;
+    let largest = distances.iter().copied().fold(map.largest(), f64::max);
+    let scale = Scale::reaching(largest, ruler.diagonal());
+    let shares = distances.iter().map(|&distance| (255.0 * scale.share(distance)).round() as u8);
+    let picture = colour_map(map, &scale, width_px)?;
+    Ok(ShownMap { picture, scale, unit: ruler.unit(), vertices: shares.collect() })
 }
 
 /// What the outcome says of both sides.
@@ -178,10 +231,14 @@ fn write_shown(path: &Path, model: &ModelPage, shown: &Shown) -> Result<(), Repo
         facts::write_verdict(html, model)?;
         html.element("div", &[("class", "looks")], |html| {
             carried::write_pictures(html, &shown.pictures)?;
-            if shown.has_meshes { carried::write_viewer(html, &shown.meshes) } else { Ok(()) }
+            if let Some(map) = &shown.map {
+                carried::write_map(html, map)?;
+            }
+            let map = shown.map.as_ref();
+            if shown.has_meshes { carried::write_viewer(html, &shown.meshes, map) } else { Ok(()) }
         })?;
         if shown.has_meshes {
-            carried::write_meshes(html, &shown.meshes)?;
+            carried::write_meshes(html, &shown.meshes, shown.map.as_ref())?;
         }
         if let Some(parts) = &model.parts {
             part_table::write_parts(html, parts)?;

@@ -24,14 +24,19 @@ pub(crate) struct Frame {
 impl Frame {
     /// The frames of all views, row by row.
     pub(crate) fn all(views: Views, up: UpAxis) -> Vec<Self> {
-        let Grid { columns, rows } = Grid::of(views);
-        let places = (0..rows).flat_map(|row| (0..columns).map(move |column| (row, column)));
-        let looking = |(row, column)| {
-            let (forward, up) = direction(views, up, column, row);
+        let (top, front) = match up {
+            UpAxis::Y => (DVec3::Y, DVec3::Z),
+            UpAxis::Z => (DVec3::Z, DVec3::NEG_Y),
+        };
+        let looking = |&number: &usize| {
+            let [x, y, z] = STANDS[number].towards;
+            let forward = -(DVec3::X * x + top * y + front * z).normalize();
+            // From above and from below, the front is at the lower and at the upper edge.
+            let up = if x == 0.0 && z == 0.0 { front * -y } else { top };
             let right = forward.cross(up).normalize();
             Self { right, up: right.cross(forward), forward }
         };
-        places.map(looking).collect()
+        stands_of(views).iter().map(looking).collect()
     }
 
     /// A place of the model as coordinates along right, up and forward.
@@ -83,6 +88,8 @@ impl Grid {
         match views {
             Views::Isometric => Self { columns: 1, rows: 1 },
             Views::Four => Self { columns: 2, rows: 2 },
+            Views::Six => Self { columns: 3, rows: 2 },
+            Views::Fourteen => Self { columns: 7, rows: 2 },
         }
     }
 }
@@ -141,6 +148,23 @@ impl Camera {
         }
     }
 
+    /// The place of the model that a sample shows; the depth as [`Self::project`] gives it.
+    pub(crate) fn unproject(&self, x: f64, y: f64, depth: f64) -> DVec3 {
+        let from_centre = DVec3::new(
+            (x - self.width * 0.5) / self.scale,
+            (self.height * 0.5 - y) / self.scale,
+            depth * self.depth_range + self.near,
+        );
+        let along = self.centre + from_centre * self.unit;
+        let Frame { right, up, forward } = self.frame;
+        right * along.x + up * along.y + forward * along.z
+    }
+
+    /// The length of the depth range in samples.
+    pub(crate) fn depth_samples(&self) -> f64 {
+        self.depth_range * self.scale
+    }
+
     /// A normal as the viewer sees it: x right, y up, z towards the viewer.
     pub(crate) fn turn(&self, normal: DVec3) -> DVec3 {
         self.frame.along(normal) * DVec3::new(1.0, 1.0, -1.0)
@@ -152,18 +176,48 @@ impl Camera {
     }
 }
 
-/// The direction of sight, and a direction that is not parallel to it and points up.
-fn direction(views: Views, up: UpAxis, column: u32, row: u32) -> (DVec3, DVec3) {
-    let (top, front) = match up {
-        UpAxis::Y => (DVec3::Y, DVec3::Z),
-        UpAxis::Z => (DVec3::Z, DVec3::NEG_Y),
-    };
-    match (views, row, column) {
-        (Views::Four, 0, 0) => (-front, top),
-        (Views::Four, 0, _) => (front, top),
-        (Views::Four, _, 0) => (-top, -front),
-        (Views::Four, ..) | (Views::Isometric, ..) => (-(DVec3::X + top + front).normalize(), top),
+/// Where a viewer stands.
+struct Stand {
+    name: &'static str,
+    /// Along right, top and front of the model.
+    towards: [f64; 3],
+}
+
+const fn stand(name: &'static str, towards: [f64; 3]) -> Stand {
+    Stand { name, towards }
+}
+
+/// All stands: those along the axes, then those at the corners of a cube.
+const STANDS: [Stand; 14] = [
+    stand("front", [0.0, 0.0, 1.0]),
+    stand("back", [0.0, 0.0, -1.0]),
+    stand("right", [1.0, 0.0, 0.0]),
+    stand("left", [-1.0, 0.0, 0.0]),
+    stand("top", [0.0, 1.0, 0.0]),
+    stand("bottom", [0.0, -1.0, 0.0]),
+    stand("front-right-top", [1.0, 1.0, 1.0]),
+    stand("front-left-top", [-1.0, 1.0, 1.0]),
+    stand("front-right-bottom", [1.0, -1.0, 1.0]),
+    stand("front-left-bottom", [-1.0, -1.0, 1.0]),
+    stand("back-right-top", [1.0, 1.0, -1.0]),
+    stand("back-left-top", [-1.0, 1.0, -1.0]),
+    stand("back-right-bottom", [1.0, -1.0, -1.0]),
+    stand("back-left-bottom", [-1.0, -1.0, -1.0]),
+];
+
+/// Numbers of the stands of all views, row by row.
+fn stands_of(views: Views) -> &'static [usize] {
+    match views {
+        Views::Isometric => &[6],
+        Views::Four => &[0, 1, 4, 6],
+        Views::Six => &[0, 1, 2, 3, 4, 5],
+        Views::Fourteen => &[0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13],
     }
+}
+
+/// The names of all views, in the order of [`Frame::all`].
+pub(crate) fn names_of(views: Views) -> impl Iterator<Item = &'static str> {
+    stands_of(views).iter().map(|&number| STANDS[number].name)
 }
 
 #[cfg(test)]
@@ -183,9 +237,12 @@ mod tests {
         for corners in [thin, usual, [[7.0; 3]; 3]] {
             let corners = corners.map(DVec3::from_array);
             for up in [UpAxis::Y, UpAxis::Z] {
-                for frame in Frame::all(Views::Four, up) {
+                for frame in Frame::all(Views::Fourteen, up) {
                     let camera = camera(frame, &[corners]);
                     for at in corners.map(|corner| camera.project(corner)) {
+                        let again = camera.project(camera.unproject(at.x, at.y, at.depth));
+                        let off = (again.x - at.x).abs().max((again.y - at.y).abs());
+                        assert!(off.max((again.depth - at.depth).abs()) < 1e-6, "{again:?} {at:?}");
                         assert!(at.x > 0.0 && at.x < 400.0, "{at:?}");
                         assert!(at.y > 0.0 && at.y < 300.0, "{at:?}");
                         assert!(at.depth > 0.0 && at.depth < 1.0, "{at:?}");

@@ -3,6 +3,8 @@
 use std::fmt;
 use std::path::{Path, PathBuf};
 
+use crate::store::StoreError;
+
 /// Which of the two meshes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Side {
@@ -80,12 +82,31 @@ pub enum PreviewError<E: std::error::Error> {
         /// How much there is.
         share_bytes: u64,
     },
+    /// The surfaces cannot be measured: the scratch disk fails.
+    #[error("Cannot measure the deviation for the preview")]
+    Measure(#[source] StoreError),
+    /// No threads to measure with.
+    #[error("Cannot start {threads} threads for the preview")]
+    Threads {
+        /// How many were asked for.
+        threads: usize,
+        /// The system's word.
+        source: rayon::ThreadPoolBuildError,
+    },
     /// The caller asked to stop; no file was put in place.
     #[error("Stopped on request")]
     Cancelled,
 }
 
 impl<E: std::error::Error> PreviewError<E> {
+    /// What the scratch disk says.
+    pub(crate) fn measure(error: StoreError) -> Self {
+        match error {
+            StoreError::Cancelled => Self::Cancelled,
+            error => Self::Measure(error),
+        }
+    }
+
     /// Wraps a system error with what was tried and where.
     pub(crate) fn io(doing: &'static str, path: &Path, source: std::io::Error) -> Self {
         Self::Io { doing, path: path.to_path_buf(), source }

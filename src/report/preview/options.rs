@@ -1,5 +1,8 @@
 //! What a preview shows, and what is known of it afterwards.
 
+#[cfg(doc)]
+use crate::mesh::Surface;
+
 /// The directions from which the model is seen.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 pub enum Views {
@@ -8,6 +11,10 @@ pub enum Views {
     Isometric,
     /// Two by two: front, back, top and isometric, row by row.
     Four,
+    /// Along the axes: front, back, right, left, top and bottom.
+    Six,
+    /// These, and from the corners of a cube.
+    Fourteen,
 }
 
 /// The axis of the model that points up.
@@ -20,8 +27,20 @@ pub enum UpAxis {
     Z,
 }
 
+/// How it is known what of the output closes an opening (EXR).
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub enum PatchRule {
+    /// It is not.
+    #[default]
+    Unknown,
+    /// The output tells: by materials whose names end with [`Surface::PATCH_ENDING`].
+    Tagged,
+    /// It lies farther from the input than this, model units.
+    Beyond(f64),
+}
+
 /// How a preview is drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PreviewOptions {
     /// Width of one view of one side.
     pub width_px: u32,
@@ -35,6 +54,10 @@ pub struct PreviewOptions {
     pub up: UpAxis,
     /// Whether the edges of triangles are drawn as dark lines.
     pub edges: bool,
+    /// Whether creases, and where one surface ends before another, are drawn as dark lines (PNG).
+    pub creases: bool,
+    /// How patches are known (EXR).
+    pub patches: PatchRule,
 }
 
 impl Default for PreviewOptions {
@@ -46,6 +69,8 @@ impl Default for PreviewOptions {
             views: Views::default(),
             up: UpAxis::default(),
             edges: false,
+            creases: true,
+            patches: PatchRule::default(),
         }
     }
 }
@@ -64,7 +89,7 @@ pub struct SideStats {
 }
 
 /// What was drawn.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct PreviewStats {
     /// Width of the picture (PNG) or of a layer (EXR).
     pub width_px: u32,
@@ -76,6 +101,8 @@ pub struct PreviewStats {
     pub input: SideStats,
     /// The mesh after the repair.
     pub output: SideStats,
+    /// The largest deviation that the map shows, model units; `None` where there is no map.
+    pub largest_deviation: Option<f64>,
     /// Size of the finished file.
     pub bytes: u64,
 }

@@ -8,6 +8,8 @@
 //! Memory:     width x rows samples.
 //! Source:     J. Pineda, A Parallel Algorithm for Polygon Rasterization, 1988.
 
+use std::ops::Range;
+
 use crate::report::preview::camera::Projected;
 use crate::report::preview::clip::Piece;
 
@@ -34,6 +36,8 @@ pub(crate) struct Band<P> {
     pub(crate) first_row: usize,
     /// Row after row.
     pub(crate) samples: Vec<Sample<P>>,
+    /// Rows of the view that are its own; those beside them are there to be looked at.
+    own: Range<usize>,
 }
 
 /// What a triangle is painted with.
@@ -48,15 +52,28 @@ impl<P: Copy> Band<P> {
     /// A band of `rows` rows showing nothing but `background`.
     pub(crate) fn new(width: usize, rows: usize, background: P) -> Self {
         let nothing = Sample { depth: f32::INFINITY, paint: background, back: false };
-        Self { width, first_row: 0, samples: vec![nothing; width * rows] }
+        Self { width, first_row: 0, samples: vec![nothing; width * rows], own: 0..rows }
     }
 
-    /// Forgets everything and holds `rows` rows from `first_row` on; never more than at first.
-    pub(crate) fn restart(&mut self, first_row: usize, rows: usize, background: P) {
+    /// Forgets everything and holds the rows of `held`, of which `own` are its own; never more than
+    /// at first.
+    pub(crate) fn restart(&mut self, held: Range<usize>, own: Range<usize>, background: P) {
         let nothing = Sample { depth: f32::INFINITY, paint: background, back: false };
-        self.first_row = first_row;
+        self.first_row = held.start;
         self.samples.clear();
-        self.samples.resize(self.width * rows, nothing);
+        self.samples.resize(self.width * held.len(), nothing);
+        self.own = own;
+    }
+
+    /// Its own rows among those that it holds.
+    pub(crate) fn own_rows(&self) -> Range<usize> {
+        self.own.start - self.first_row..self.own.end - self.first_row
+    }
+
+    /// The samples of its own rows.
+    pub(crate) fn own_samples(&self) -> &[Sample<P>] {
+        let rows = self.own_rows();
+        &self.samples[rows.start * self.width..rows.end * self.width]
     }
 
     /// Draws a triangle; `brush` is asked only when the triangle can touch a sample of the band.
@@ -282,7 +299,7 @@ mod tests {
             let mut whole = Band::new(16, 16, 0_u8);
             whole.draw(&piece, |_| Brush { face: 1, line: Some((2, 1.0)) });
             let mut one = Band::new(16, 1, 0_u8);
-            one.restart(row, 1, 0);
+            one.restart(row..row + 1, row..row + 1, 0);
             one.draw(&piece, |_| Brush { face: 1, line: Some((2, 1.0)) });
             prop_assert_eq!(&one.samples[..], &whole.samples[row * 16..(row + 1) * 16]);
         }

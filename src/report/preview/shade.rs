@@ -18,18 +18,23 @@ const FILL: (DVec3, f64) = (DVec3::new(0.70, -0.10, 0.71), 0.28);
 /// How much of the light a line along an edge keeps.
 const LINE: f32 = 0.15;
 
-/// The colour of a face; `seen` is its normal, turned towards the viewer if it is a back face.
-pub(crate) fn shade(side: Side, back: bool, seen: DVec3) -> [f32; 3] {
+/// How bright a face is lit, 0 to 1; `seen` is its normal, turned towards the viewer if it is a back
+/// face.
+pub(crate) fn light(side: Side, back: bool, seen: DVec3) -> f32 {
+    let lit = |(towards, strength): (DVec3, f64)| strength * seen.dot(towards).max(0.0);
+    let light = (AMBIENT + lit(KEY) + lit(FILL)).min(1.0) as f32;
+    // A wrong face of the output must be seen even in the shade.
+    if side == Side::Output && back { light.max(0.5) } else { light }
+}
+
+/// The colour of a face in that light.
+pub(crate) fn shade(side: Side, back: bool, light: f32) -> [f32; 3] {
     let base: [f32; 3] = match (side, back) {
         (Side::Input, false) => [0.58, 0.64, 0.72],
         (Side::Input, true) => [0.72, 0.30, 0.24],
         (Side::Output, false) => [0.66, 0.66, 0.66],
         (Side::Output, true) => [1.00, 0.02, 0.02],
     };
-    let lit = |(towards, strength): (DVec3, f64)| strength * seen.dot(towards).max(0.0);
-    let light = (AMBIENT + lit(KEY) + lit(FILL)).min(1.0) as f32;
-    // A wrong face of the output must be seen even in the shade.
-    let light = if side == Side::Output && back { light.max(0.5) } else { light };
     base.map(|channel| channel * light)
 }
 
@@ -62,7 +67,8 @@ mod tests {
     #[test]
     fn a_back_face_of_the_output_is_red_in_any_light() {
         for seen in [DVec3::Z, DVec3::X, DVec3::NEG_Y] {
-            let [red, green, blue] = to_srgb(shade(Side::Output, true, seen));
+            let [red, green, blue] =
+                to_srgb(shade(Side::Output, true, light(Side::Output, true, seen)));
             assert!(red > 150 && green < 60 && blue < 60);
         }
     }

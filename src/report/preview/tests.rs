@@ -8,13 +8,16 @@ use std::path::Path;
 
 use exr::prelude::{ReadChannels, ReadLayers};
 
-use crate::mesh::{Discarded, MeshSource, TriangleBatch};
+use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
 use crate::monitor::{Monitor, Void};
-use crate::report::image_exr::NO_PART;
-use crate::report::image_png::SEPARATOR_PX;
+use crate::report::preview::legend::WIDTH_PX;
+use crate::report::preview::panels::SEPARATOR_PX;
+use crate::report::preview::texels::NO_PART;
 use crate::report::preview::{
-    OpenSource, PreviewError, PreviewOptions, PreviewStats, Side, Views, write_preview,
+    Measuring, OpenSource, PatchRule, PreviewError, PreviewOptions, PreviewStats, Scene, Side,
+    Views, write_preview,
 };
+use crate::store::Scratch;
 
 type Triangles = Vec<[[f64; 3]; 3]>;
 
@@ -30,13 +33,19 @@ impl MeshSource for Listed {
     fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, io::Error> {
         batch.clear();
         for corners in self.left.by_ref().take(5) {
-            batch.push(corners, self.parts, 0, self.parts);
+            // What closes the top of the cube is another material.
+            let is_lid = corners.iter().all(|corner| corner[1] == 1.0);
+            batch.push(corners, self.parts, u32::from(is_lid), self.parts);
             self.parts += 1;
         }
         Ok(!batch.is_empty())
     }
     fn part_count(&self) -> u64 {
         self.parts.into()
+    }
+    fn material(&mut self, number: u32) -> Result<Material, io::Error> {
+        let name = if number == 1 { "wood.patch" } else { "wood" };
+        Ok(Material { name: name.to_owned(), ..Material::default() })
     }
     fn discarded(&self) -> Discarded {
         Discarded::default()
@@ -89,7 +98,31 @@ fn write(
     let open_output = output.map(|output| move || open(output));
     let open_output: Option<&OpenSource<'_, io::Error>> =
         open_output.as_ref().map(|open| open as &OpenSource<'_, io::Error>);
-    write_preview(path, &|| open(input), open_output, options, &Void)
+    let scene =
+        Scene { input: &|| open(input), output: open_output, measuring: None, monitor: &Void };
+    write_preview(path, &scene, options)
+}
+
+/// The same with a map, by so many threads.
+fn write_map(
+    path: &Path,
+    (input, output): (&Triangles, &Triangles),
+    options: &PreviewOptions,
+    threads: usize,
+) -> Result<PreviewStats, PreviewError<io::Error>> {
+    let scratch = Scratch::new(path.parent().unwrap());
+    let measuring = Some(Measuring { scratch: &scratch, threads });
+    let (input, output): (&OpenSource<'_, io::Error>, &OpenSource<'_, io::Error>) =
+        (&|| open(input), &|| open(output));
+    let scene = Scene { input, output: Some(output), measuring, monitor: &Void };
+    write_preview(path, &scene, options)
+}
+
+/// The cube without its top (y = 1).
+fn open_cube() -> Triangles {
+    let mut open = cube();
+    open.retain(|corners| corners.iter().any(|corner| corner[1] < 0.5));
+    open
 }
 
 struct Picture {
@@ -215,7 +248,7 @@ fn holes_and_turned_faces_show_their_backs() {
     let stats = write(&path, &cube(), Some(&inside_out), &small()).unwrap();
     assert_eq!((stats.output.front_samples, stats.input.back_samples), (0, 0));
     assert_eq!(stats.output.back_samples, stats.input.front_samples);
-    let [red, green, blue] = Picture::read(&path).pixel(120 + SEPARATOR_PX as usize + 60, 50);
+    let [red, green, blue] = Picture::read(&path).pixel(120 + SEPARATOR_PX as usize + 80, 65);
     assert!(red > 150 && green < 60 && blue < 60);
 }
 
@@ -258,38 +291,164 @@ fn edges_darken_pixels_along_the_edges_only() {
 }
 
 #[test]
-fn both_layers_come_back_from_the_exr() {
+fn the_map_is_hot_where_a_lid_was_put_on_and_grey_elsewhere() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lid.png");
+    let stats = write_map(&path, (&open_cube(), &cube()), &small(), 2).unwrap();
+    let picture = Picture::read(&path);
+    let map = 2 * (120 + SEPARATOR_PX as usize);
+    assert_eq!(picture.width, map + 120 + WIDTH_PX as usize);
+    // The middle of the lid is half an edge from the walls.
+    let largest = stats.largest_deviation.unwrap();
+    assert!((0.48..=0.5).contains(&largest), "{largest}");
+    let spread = |[red, green, blue]: [u8; 3]| red.max(green).max(blue) - red.min(green).min(blue);
+    for (x, y) in [(40, 65), (80, 65), (35, 60), (85, 70)] {
+        assert!(spread(picture.pixel(map + x, y)) < 16, "a wall has not moved");
+    }
+    let [red, green, blue] = picture.pixel(map + 60, 25);
+    assert!(red > green + 60 && red > blue, "{red} {green} {blue}");
+}
+
+#[test]
+fn where_nothing_can_be_measured_there_is_no_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("none.png");
+    let stats = write_map(&path, (&vec![[[1.0; 3]; 3]], &cube()), &small(), 1).unwrap();
+    assert_eq!((stats.largest_deviation, stats.width_px), (None, 2 * 120 + SEPARATOR_PX));
+    let stats = write_map(&path, (&cube(), &Vec::new()), &small(), 1).unwrap();
+    assert_eq!(stats.largest_deviation, Some(0.0), "an empty output shows nothing");
+}
+
+#[test]
+fn a_map_is_the_same_for_any_share_and_any_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("map.png");
+    let pictures = [(200 << 10, 1), (200 << 10, 3), (64 << 20, 2)].map(|(share_bytes, threads)| {
+        let options = PreviewOptions { share_bytes, views: Views::Four, ..small() };
+        write_map(&path, (&open_cube(), &cube()), &options, threads).unwrap();
+        fs::read(&path).unwrap()
+    });
+    assert!(pictures[0] == pictures[1] && pictures[1] == pictures[2]);
+}
+
+#[test]
+fn creases_are_dark_and_faces_are_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let [plain, creased] = [false, true].map(|creases| {
+        let path = folder.path().join(format!("{creases}.png"));
+        write(&path, &cube(), None, &PreviewOptions { creases, ..small() }).unwrap();
+        Picture::read(&path)
+    });
+    let places = (0..100).flat_map(|y| (0..120).map(move |x| (x, y)));
+    let changed: Vec<_> =
+        places.filter(|&(x, y)| plain.pixel(x, y) != creased.pixel(x, y)).collect();
+    // Three edges of the cube meet in the middle of the picture, each 53 pixels long.
+    assert!((140..500).contains(&changed.len()), "{}", changed.len());
+    assert!(changed.iter().all(|&(x, y)| creased.pixel(x, y)[0] < plain.pixel(x, y)[0]));
+    assert!(changed.contains(&(60, 80)), "the edge from the middle down");
+}
+
+/// The layers of an EXR file, by name.
+struct Layers(
+    Vec<(String, exr::prelude::Layer<exr::prelude::AnyChannels<exr::prelude::FlatSamples>>)>,
+);
+
+impl Layers {
+    fn read(path: &Path) -> Self {
+        let image = exr::prelude::read()
+            .no_deep_data()
+            .largest_resolution_level()
+            .all_channels()
+            .all_layers()
+            .all_attributes()
+            .from_file(path)
+            .unwrap();
+        let name = |layer: &exr::prelude::Layer<_>| layer.attributes.layer_name.clone().unwrap();
+        Self(image.layer_data.into_iter().map(|layer| (name(&layer).to_string(), layer)).collect())
+    }
+
+    fn names(&self) -> Vec<&str> {
+        self.0.iter().map(|(name, _)| name.as_str()).collect()
+    }
+
+    /// A value of a pixel in a view of 120 columns.
+    fn value(&self, layer: &str, channel: &str, (x, y): (usize, usize)) -> f64 {
+        let (_, layer) = self.0.iter().find(|(name, _)| name == layer).unwrap();
+        assert_eq!((layer.size.0, layer.size.1), (120, 100));
+        let mut channels = layer.channel_data.list.iter();
+        let channel = channels.find(|found| found.name.to_string() == channel).unwrap();
+        f64::from(channel.sample_data.value_by_flat_index(y * 120 + x).to_f32())
+    }
+}
+
+#[test]
+fn all_views_of_both_sides_come_back_from_the_exr() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("cube.EXR");
     let options = PreviewOptions { views: Views::Four, ..small() };
     write(&path, &cube()[..8].to_vec(), Some(&cube()), &options).unwrap();
-    let image = exr::prelude::read()
-        .no_deep_data()
-        .largest_resolution_level()
-        .all_channels()
-        .all_layers()
-        .all_attributes()
-        .from_file(&path)
-        .unwrap();
-    let names: Vec<_> =
-        image.layer_data.iter().map(|layer| layer.attributes.layer_name.clone().unwrap()).collect();
-    assert_eq!(names.iter().map(ToString::to_string).collect::<Vec<_>>(), ["input", "output"]);
-    let output = &image.layer_data[1];
-    assert_eq!((output.size.0, output.size.1), (240, 200));
-    let value = |name: &str, x: usize, y: usize| {
-        let mut channels = output.channel_data.list.iter();
-        let channel = channels.find(|channel| channel.name.to_string() == name).unwrap();
-        f64::from(channel.sample_data.value_by_flat_index(y * 240 + x).to_f32())
-    };
-    // The middle of the front view, at the top left: the face z = 1, whose triangles are 10, 11.
+    let layers = Layers::read(&path);
+    let views = ["front", "back", "top", "front-right-top"];
+    let names = ["input", "output"].map(|side| views.map(|view| format!("{side}.{view}")));
+    assert_eq!(layers.names(), names.as_flattened());
+    let value = |channel: &str, x, y| layers.value("output.front", channel, (x, y));
+    // The middle of the front view: the face z = 1, whose triangles are 10, 11.
     let normal = ["normal.X", "normal.Y", "normal.Z"].map(|name| value(name, 60, 45));
     assert_eq!(normal, [0.0, 0.0, 1.0]);
     assert!([10.0, 11.0].contains(&value("part", 60, 45)));
     // The depth range begins a tenth of a half edge before the cube.
     assert!((value("Z", 60, 45) - 0.05).abs() < 1e-5, "{}", value("Z", 60, 45));
     assert!(value("R", 60, 45) > 0.1 && value("G", 60, 45) > 0.1 && value("B", 60, 45) > 0.1);
-    assert_eq!(value("Z", 1, 1), f64::INFINITY);
-    assert_eq!(value("part", 1, 1), f64::from(NO_PART as f32));
+    assert!(value("deviation", 60, 45).is_nan(), "nothing was measured");
+    assert_eq!(value("patch", 60, 45), f64::from(NO_PART as f32), "nor is it known");
+    for name in ["Z", "deviation"] {
+        assert_eq!(value(name, 1, 1), f64::INFINITY);
+    }
+    for name in ["part", "material", "patch"] {
+        assert_eq!(value(name, 1, 1), f64::from(NO_PART as f32));
+    }
+}
+
+#[test]
+fn the_face_that_closes_a_box_is_a_patch_and_deviates_and_the_others_do_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("lid.exr");
+    for patches in [PatchRule::Tagged, PatchRule::Beyond(0.05)] {
+        let options = PreviewOptions { views: Views::Fourteen, patches, ..small() };
+        write_map(&path, (&open_cube(), &cube()), &options, 2).unwrap();
+        let layers = Layers::read(&path);
+        assert_eq!(layers.names().len(), 2 * 14);
+        let middle = (60, 50);
+        for view in ["front", "back", "left", "right", "bottom"] {
+            let layer = format!("output.{view}");
+            let deviation = layers.value(&layer, "deviation", middle);
+            assert!(deviation < 1e-6, "{view} lies {deviation} away");
+            let [patch, material] = ["patch", "material"].map(|c| layers.value(&layer, c, middle));
+            assert_eq!((patch, material), (0.0, 0.0), "{view}");
+        }
+        let [deviation, patch, material] = ["deviation", "patch", "material"]
+            .map(|channel| layers.value("output.top", channel, middle));
+        assert!((deviation - 0.5).abs() < 0.01, "{deviation}");
+        assert_eq!((patch, material), (1.0, 1.0));
+        // Through the opening the bottom of the input is seen, where the output has one as well.
+        let [deviation, patch, depth] =
+            ["deviation", "patch", "Z"].map(|channel| layers.value("input.top", channel, middle));
+        assert!(deviation < 1e-6 && (depth - 1.05).abs() < 1e-4, "{deviation} {depth}");
+        assert_eq!(patch, 0.0);
+    }
+}
+
+#[test]
+fn layers_are_the_same_for_any_share_and_any_threads() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("layers.exr");
+    let files = [(40 << 10, 1), (40 << 10, 3), (64 << 20, 2)].map(|(share_bytes, threads)| {
+        let options = PreviewOptions { share_bytes, views: Views::Six, ..small() };
+        let stats = write_map(&path, (&open_cube(), &cube()), &options, threads).unwrap();
+        assert_eq!(stats.bands > 50, share_bytes < 1 << 20, "{} bands", stats.bands);
+        fs::read(&path).unwrap()
+    });
+    assert!(files[0] == files[1] && files[1] == files[2]);
 }
 
 #[test]
@@ -298,7 +457,7 @@ fn what_cannot_be_drawn_is_refused_with_the_number_that_is_needed() {
     let path = |name: &str| folder.path().join(name);
     let mesh = cube();
     let tight = PreviewOptions { share_bytes: 4000, ..small() };
-    for (name, at_least) in [("a.png", 120 * 4 * 8), ("a.exr", 2 * 120 * 100 * 32)] {
+    for (name, at_least) in [("a.png", 120 * 4 * 8), ("a.exr", 4 * 120 * 44)] {
         let needed = match write(&path(name), &mesh, None, &tight) {
             Err(PreviewError::ShareTooSmall { needed_bytes, share_bytes: 4000, .. }) => {
                 needed_bytes
@@ -329,7 +488,8 @@ fn a_failing_source_leaves_the_old_picture_and_nothing_else() {
         opened.set(opened.get() + 1);
         if opened.get() > 1 { Err(io::ErrorKind::NotFound.into()) } else { open(&mesh) }
     };
-    let refusal = write_preview(&path, fading, None, &small(), &Void);
+    let scene = Scene { input: fading, output: None, measuring: None, monitor: &Void };
+    let refusal = write_preview(&path, &scene, &small());
     assert!(matches!(refusal, Err(PreviewError::Source { side: Side::Input, .. })));
     assert_eq!(fs::read(&path).unwrap(), b"old");
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1);
@@ -346,7 +506,9 @@ fn a_request_to_stop_is_heard() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("never.png");
     let mesh = cube();
-    let stopped = write_preview(&path, &|| open(&mesh), None, &small(), &Stopping);
+    let input: &OpenSource<'_, io::Error> = &|| open(&mesh);
+    let scene = Scene { input, output: None, measuring: None, monitor: &Stopping };
+    let stopped = write_preview(&path, &scene, &small());
     assert!(matches!(stopped, Err(PreviewError::Cancelled)));
     assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -15,19 +15,30 @@
   const START = { yaw: Math.PI / 4, pitch: Math.asin(1 / Math.sqrt(3)), zoom: 1 };
   const view = { ...START };
 
+  const bytesOf = (text) => Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
   const numbers = (text) => {
-    const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+    const bytes = bytesOf(text);
     const words = new DataView(bytes.buffer);
     const out = new Uint16Array(bytes.length / 2);
     for (let i = 0; i < out.length; i++) out[i] = words.getUint16(2 * i, true);
     return out;
   };
 
-  // Corners about the middle of the cube, each with the normal of its triangle.
-  const unroll = ({ vertices, triangles }) => {
+  // A colour of the scale, of a share of 255.
+  const tint = (share, ramp) => {
+    const place = (share / 255) * (ramp.length - 1);
+    const below = Math.min(Math.floor(place), ramp.length - 2);
+    const part = place - below;
+    return ramp[below].map((low, i) => (low + (ramp[below + 1][i] - low) * part) / 255);
+  };
+
+  // Corners about the middle of the cube, each with the normal of its triangle and the colour of its
+  // deviation.
+  const PARTS = 9;
+  const unroll = ({ vertices, triangles }, shares, ramp) => {
     const places = numbers(vertices);
     const corners = numbers(triangles);
-    const out = new Float32Array(6 * corners.length);
+    const out = new Float32Array(PARTS * corners.length);
     const at = (corner, axis) => places[3 * corner + axis] / 32767.5 - 1;
     for (let first = 0; first < corners.length; first += 3) {
       const [a, b, c] = [0, 1, 2].map((k) => [0, 1, 2].map((axis) => at(corners[first + k], axis)));
@@ -35,8 +46,9 @@
       const normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
       const length = Math.hypot(...normal) || 1;
       [a, b, c].forEach((place, k) => {
-        out.set(place, 6 * (first + k));
-        out.set(normal.map((value) => value / length), 6 * (first + k) + 3);
+        out.set(place, PARTS * (first + k));
+        out.set(normal.map((value) => value / length), PARTS * (first + k) + 3);
+        if (shares) out.set(tint(shares[corners[first + k]], ramp), PARTS * (first + k) + 6);
       });
     }
     return out;
@@ -50,44 +62,51 @@
   };
   const program = gl.createProgram();
   gl.attachShader(program, compile(gl.VERTEX_SHADER, `
-    attribute vec3 place, normal;
+    attribute vec3 place, normal, deviation;
     uniform mat3 turn;
     uniform float scale;
-    varying vec3 seen;
+    varying vec3 seen, tint;
     void main() {
       vec3 at = turn * place;
+      tint = deviation;
       seen = turn * normal;
       gl_Position = vec4(at.xy * scale, -at.z * 0.5, 1.0);
     }`));
   gl.attachShader(program, compile(gl.FRAGMENT_SHADER, `
     precision mediump float;
     uniform vec3 colour, back;
-    varying vec3 seen;
+    uniform bool mapped;
+    varying vec3 seen, tint;
     void main() {
       vec3 n = normalize(gl_FrontFacing ? seen : -seen);
       vec3 base = gl_FrontFacing ? colour : back;
       float light = 0.10 + 0.75 * max(dot(n, vec3(-0.45, 0.75, 0.49)), 0.0)
         + 0.28 * max(dot(n, vec3(0.70, -0.10, 0.71)), 0.0);
-      gl_FragColor = vec4(pow(base * min(light, 1.0), vec3(1.0 / 2.2)), 1.0);
+      vec3 lit = pow(base * min(light, 1.0), vec3(1.0 / 2.2));
+      gl_FragColor = vec4(mapped ? tint * (0.5 + 0.5 * min(light, 1.0)) : lit, 1.0);
     }`));
   gl.linkProgram(program);
   gl.useProgram(program);
   const uniform = (name) => gl.getUniformLocation(program, name);
-  const [turn, scale, colour, back] = ["turn", "scale", "colour", "back"].map(uniform);
+  const [turn, scale, colour, back, mapped] =
+    ["turn", "scale", "colour", "back", "mapped"].map(uniform);
 
   const meshes = JSON.parse(data.textContent);
   const sides = {};
   for (const name of ["before", "after"]) {
-    const corners = unroll(meshes[name]);
+    const shares = name === "after" && meshes.deviation ? bytesOf(meshes.deviation) : null;
+    const corners = unroll(meshes[name], shares, meshes.ramp);
     const buffer = gl.createBuffer();
     gl.bindBuffer(gl.ARRAY_BUFFER, buffer);
     gl.bufferData(gl.ARRAY_BUFFER, corners, gl.STATIC_DRAW);
-    sides[name] = { buffer, all: corners, corners: corners.length / 6 };
+    sides[name] = { buffer, all: corners, corners: corners.length / PARTS };
   }
+  // The result once more, in other colours.
+  if (meshes.deviation) sides.deviation = sides.after;
   let side = "after";
   // Whatever way it is turned, all of the result is seen.
   let radius = 0;
-  for (let i = 0; i < sides.after.all.length; i += 6) {
+  for (let i = 0; i < sides.after.all.length; i += PARTS) {
     radius = Math.max(radius, Math.hypot(...sides.after.all.subarray(i, i + 3)));
   }
   radius = radius || 1;
@@ -107,15 +126,18 @@
     const front = side === "before" ? [0.58, 0.64, 0.72] : [0.66, 0.66, 0.66];
     gl.uniform3fv(colour, front);
     // A mesh that was made lighter has faces turned over that the model has not.
-    gl.uniform3fv(back, meshes[side].whole ? [0.85, 0.20, 0.16] : front);
+    const mesh = meshes[side === "before" ? "before" : "after"];
+    gl.uniform3fv(back, mesh.whole ? [0.85, 0.20, 0.16] : front);
+    gl.uniform1i(mapped, side === "deviation" ? 1 : 0);
     gl.bindBuffer(gl.ARRAY_BUFFER, sides[side].buffer);
-    for (const [name, offset] of [["place", 0], ["normal", 12]]) {
+    for (const [name, offset] of [["place", 0], ["normal", 12], ["deviation", 24]]) {
       const slot = gl.getAttribLocation(program, name);
       gl.enableVertexAttribArray(slot);
-      gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 24, offset);
+      gl.vertexAttribPointer(slot, 3, gl.FLOAT, false, 4 * PARTS, offset);
     }
     gl.drawArrays(gl.TRIANGLES, 0, sides[side].corners);
     told.textContent = side;
+    viewer.classList.toggle("mapped", side === "deviation");
     for (const button of viewer.querySelectorAll("[data-side]")) {
       button.setAttribute("aria-pressed", String(button.dataset.side === side));
     }
