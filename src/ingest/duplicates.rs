@@ -17,7 +17,7 @@ use serde::{Deserialize, Serialize};
 use crate::ingest::bins::Bins;
 use crate::ingest::examine::Examiner;
 use crate::ingest::facts::{
-    Copied, Fact, JOINED, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, counts_once,
+    Copied, Fact, JOINED, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, RIM_FOLDED, counts_once,
 };
 use crate::ingest::fins::FinStats;
 use crate::octree::{Domain, DropRecord};
@@ -169,7 +169,7 @@ impl Verdicts {
             verdicts.kinds.set(patch, before | fact.kind)
         })?;
         // One triangle of each group on an edge that is otherwise even leaves it open.
-        let open_when_once = RIM_EVEN | RIM_ALONE_OPEN | RIM_ALONE_CLOSED;
+        let open_when_once = RIM_EVEN | RIM_FOLDED | RIM_ALONE_OPEN | RIM_ALONE_CLOSED;
         each(&told, |fact| {
             if fact.kind & open_when_once != 0 && verdicts.counts_once(fact.group)? {
                 stats.add_rim(f64::from_bits(fact.value));

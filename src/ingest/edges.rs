@@ -5,7 +5,9 @@
 //! Memory:  one edge is counted at a time, however many triangles meet it.
 
 use crate::ingest::duplicates::SettleStats;
-use crate::ingest::facts::{Fact, JOINED, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, RIM_ODD};
+use crate::ingest::facts::{
+    Fact, JOINED, RIM_ALONE_CLOSED, RIM_ALONE_OPEN, RIM_EVEN, RIM_FOLDED, RIM_ODD,
+};
 use crate::ingest::packed::{EdgeUse, NO_GROUP, NO_WIDTH};
 use crate::octree::points::{length_of, unpack_ends};
 use crate::store::{Outbox, Sorter, StoreError};
@@ -18,6 +20,10 @@ impl SettleStats {
     }
 }
 
+/// Two triangles at an edge lie on each other if they are turned by less than this, about three
+/// degrees: facets of solids that touch part further.
+const FOLDED_TURN: u32 = 1 << 25;
+
 /// The uses of one edge so far.
 struct Tally {
     ends: [u64; 3],
@@ -28,13 +34,26 @@ struct Tally {
     even_count: u64,
     /// All that is not in an even group; odd groups are one each.
     others: u64,
+    /// How the first two of them are turned.
+    turns: [u32; 2],
+    /// The turn of the last use.
+    last_turn: u32,
     /// The edges as given, cancelled in pairs.
     given: u64,
 }
 
 impl Tally {
     fn new(ends: [u64; 3]) -> Self {
-        Self { ends, run: (NO_GROUP, 0), even: None, even_count: 0, others: 0, given: 0 }
+        Self {
+            ends,
+            run: (NO_GROUP, 0),
+            even: None,
+            even_count: 0,
+            others: 0,
+            turns: [0; 2],
+            last_turn: 0,
+            given: 0,
+        }
     }
 
     fn add(&mut self, edge: &EdgeUse, facts: &mut Outbox<Fact>) -> Result<(), StoreError> {
@@ -44,15 +63,18 @@ impl Tally {
             self.run = (edge.group, 0);
         }
         self.run.1 += 1;
+        self.last_turn = edge.turn;
+        if edge.group == NO_GROUP {
+            self.add_other(edge.turn);
+        }
         Ok(())
     }
 
     fn end_run(&mut self, facts: &mut Outbox<Fact>) -> Result<(), StoreError> {
         let (group, uses) = self.run;
         match group {
-            NO_WIDTH => {}
-            NO_GROUP => self.others += uses,
-            _ if !uses.is_multiple_of(2) => self.others += 1,
+            NO_WIDTH | NO_GROUP => {}
+            _ if !uses.is_multiple_of(2) => self.add_other(self.last_turn),
             _ => {
                 self.even_count += 1;
                 if let Some((_, last)) = self.even {
@@ -62,6 +84,19 @@ impl Tally {
             }
         }
         Ok(())
+    }
+
+    fn add_other(&mut self, turn: u32) {
+        if let Some(place) = self.turns.get_mut(self.others as usize) {
+            *place = turn;
+        }
+        self.others += 1;
+    }
+
+    /// Whether the others are two that lie on each other.
+    fn are_folded(&self) -> bool {
+        let apart = self.turns[0].wrapping_sub(self.turns[1]);
+        self.others == 2 && apart.min(apart.wrapping_neg()) < FOLDED_TURN
     }
 
     /// All uses are in.
@@ -80,6 +115,7 @@ impl Tally {
                 let kind = match (self.others, others_are_even) {
                     (0, _) if self.given == 0 => RIM_ALONE_CLOSED,
                     (0, _) => RIM_ALONE_OPEN,
+                    (_, true) if self.are_folded() => RIM_FOLDED,
                     (_, true) => RIM_EVEN,
                     (_, false) => RIM_ODD,
                 };

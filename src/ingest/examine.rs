@@ -11,6 +11,7 @@ use crate::ingest::edges::judge_edges;
 use crate::ingest::facts::{Copied, DIFFERS, Fact};
 use crate::ingest::packed::{
     EdgeUse, KeySet, Member, NO_GROUP, NO_WIDTH, Triple, given_edge, given_triangle, pack_corners,
+    turn_of,
 };
 use crate::octree::points::{is_degenerate, length_of, owner, pack_ends, snapped, unpack_ends};
 use crate::octree::{BinEntry, Domain, SoupTriangle};
@@ -189,7 +190,8 @@ impl Examiner<'_> {
             let ends = [a.min(b), a.max(b)];
             if a != b && owner(self.domain, ends[0]) == brick {
                 let given = given_edge(triangle.corners[i], triangle.corners[(i + 1) % 3]);
-                edges.push(EdgeUse { ends: pack_ends(ends), given, group, unused: 0 })?;
+                let turn = turn_of(ends, corners[(i + 2) % 3]);
+                edges.push(EdgeUse { ends: pack_ends(ends), given, group, turn })?;
             }
         }
         Ok(())

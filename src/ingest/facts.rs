@@ -8,11 +8,13 @@
 //! - other triangles in odd number somewhere: the soup is open there, one copy counts;
 //! - else no other triangles somewhere: a panel that was written twice, one copy counts; unless the
 //!   copies differ as given and their rim is closed as given: a fold that snapping pressed flat;
+//! - else two all along that lie on each other but for a hair: a panel with two sides, some of which
+//!   are exact copies and some not; one copy counts, unless the copies differ as given;
 //! - else in even number all along: an interface, none counts;
 //! - no rim: a closed surface that was written twice, one copy counts.
 //!
-//! So a soup that is closed mod 2 as given stays so, but for panels that end in the open and whose
-//! sides are exact copies: nothing tells such a panel from a flat bag.
+//! So a soup that is closed mod 2 as given stays so, but for panels whose sides are exact copies and
+//! that end in the open or where the copies end: nothing tells such a panel from a flat bag.
 
 use bytemuck::{Pod, Zeroable};
 
@@ -53,6 +55,8 @@ pub(crate) const DIFFERS: u32 = 1;
 pub(crate) const RIM_ODD: u32 = 2;
 /// ... an even number, and not zero.
 pub(crate) const RIM_EVEN: u32 = 4;
+/// ... two, and these lie on each other but for a hair.
+pub(crate) const RIM_FOLDED: u32 = 32;
 /// ... none, and the edges of the copies as given do not cancel in pairs.
 pub(crate) const RIM_ALONE_OPEN: u32 = 8;
 /// ... none, and they do.
@@ -72,7 +76,7 @@ pub(crate) fn counts_once(kinds: u32) -> bool {
     if saw(RIM_ODD | RIM_ALONE_OPEN) {
         return true;
     }
-    if saw(RIM_ALONE_CLOSED) {
+    if saw(RIM_ALONE_CLOSED) || saw(RIM_FOLDED) && !saw(RIM_EVEN) {
         return !saw(DIFFERS);
     }
     !saw(RIM_EVEN)
@@ -87,11 +91,14 @@ mod tests {
         // A closed surface written twice; a panel written twice, on its own or with one side at a
         // closed surface; one whose sides are a hair apart.
         let flap = RIM_EVEN | RIM_ALONE_CLOSED;
-        for kinds in [0, DIFFERS, RIM_ALONE_CLOSED, flap, RIM_ALONE_OPEN | DIFFERS] {
+        for kinds in [0, DIFFERS, RIM_ALONE_CLOSED, flap, RIM_ALONE_OPEN | DIFFERS, RIM_FOLDED] {
             assert!(counts_once(kinds), "{kinds}");
         }
         // An interface, a fold that was pressed flat, also one on a closed surface.
-        for kinds in [RIM_EVEN, RIM_ALONE_CLOSED | DIFFERS, flap | DIFFERS] {
+        let folded = [RIM_FOLDED | DIFFERS, RIM_FOLDED | RIM_EVEN];
+        for kinds in
+            [RIM_EVEN, RIM_ALONE_CLOSED | DIFFERS, flap | DIFFERS].into_iter().chain(folded)
+        {
             assert!(!counts_once(kinds), "{kinds}");
         }
         // The soup is open there anyway.

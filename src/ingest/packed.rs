@@ -1,9 +1,11 @@
 //! Edges and triangles packed into words, for sorting and hashing.
 
 use std::collections::HashSet;
+use std::f64::consts::TAU;
 use std::hash::{BuildHasherDefault, Hasher};
 
 use bytemuck::{Pod, Zeroable};
+use glam::DVec3;
 
 use crate::octree::points::{Point, pack_point};
 use crate::store::Record;
@@ -48,7 +50,20 @@ pub(crate) struct EdgeUse {
     /// See [`given_edge`].
     pub(crate) given: u64,
     pub(crate) group: u32,
-    pub(crate) unused: u32,
+    /// See [`turn_of`].
+    pub(crate) turn: u32,
+}
+
+/// How far the triangle to a third corner is turned around an edge, from a direction that the edge
+/// alone decides; a whole turn is 2^32.
+pub(crate) fn turn_of(ends: [Point; 2], corner: Point) -> u32 {
+    let [p, q, r] = [ends[0], ends[1], corner].map(|point| DVec3::from(point.map(f64::from)));
+    let along = q - p;
+    let first = along.cross(DVec3::AXES[along.abs().min_position()]);
+    let second = along.cross(first);
+    let [x, y] = [first, second].map(|axis| (r - p).dot(axis) / axis.length());
+    // The cast takes what lies below 2^32, and rounds down.
+    (y.atan2(x).rem_euclid(TAU) / TAU * 2_f64.powi(32)) as u32
 }
 
 /// The triangle has no copy.

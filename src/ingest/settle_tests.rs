@@ -2,6 +2,7 @@
 
 use std::collections::{BTreeMap, BTreeSet};
 
+use glam::DVec3;
 use proptest::prelude::*;
 
 use crate::ingest::{SettleStats, fill_bins, read_soup, settle};
@@ -115,6 +116,7 @@ fn expected(soup: &[Corners], domain: &Domain) -> (BTreeSet<u32>, u64) {
     struct Rim {
         odd: bool,
         even: bool,
+        folded: bool,
         alone_open: bool,
         alone_closed: bool,
         differs: bool,
@@ -129,14 +131,26 @@ fn expected(soup: &[Corners], domain: &Domain) -> (BTreeSet<u32>, u64) {
         let odd = |(t, n): (&[Point; 3], &u64)| if is_even(t) { 0 } else { (*n).min(1) };
         edge.triples.iter().map(odd).sum()
     };
-    for edge in edges.values() {
+    let are_folded = |ends: &[Point; 2], edge: &Edge| {
+        let odd = edge.triples.iter().filter(|(t, n)| **n > 0 && !is_even(t));
+        let corner = |(t, _): (&[Point; 3], _)| *t.iter().find(|p| !ends.contains(p)).expect("one");
+        let corners: Vec<Point> = odd.map(corner).collect();
+        let vector = |p: Point, q: Point| DVec3::from([0, 1, 2].map(|a| (q[a] - p[a]) as f64));
+        let along = vector(ends[0], ends[1]);
+        let away = |&corner: &Point| vector(ends[0], corner).reject_from(along);
+        corners.len() == 2
+            && away(&corners[0]).angle_between(away(&corners[1])) < std::f64::consts::TAU / 128.0
+    };
+    for (ends, edge) in &edges {
         let even: Vec<_> = edge.triples.iter().filter(|(t, n)| **n > 0 && is_even(t)).collect();
         if even.len() % 2 == 1 {
             let rim = rims.get_mut(&patch_of[even[0].0]).expect("a patch");
             let others = others_of(edge);
             let closed = edge.given.values().all(|n| n % 2 == 0);
             rim.odd |= others % 2 == 1;
-            rim.even |= others % 2 == 0 && others > 0;
+            let folded = others == 2 && are_folded(ends, edge);
+            rim.folded |= folded;
+            rim.even |= others % 2 == 0 && others > 0 && !folded;
             rim.alone_closed |= others == 0 && closed;
             rim.alone_open |= others == 0 && !closed;
         }
@@ -145,7 +159,8 @@ fn expected(soup: &[Corners], domain: &Domain) -> (BTreeSet<u32>, u64) {
         is_even(triple) && {
             let rim = rims[&patch_of[triple]];
             let open = rim.odd || rim.alone_open;
-            !open && if rim.alone_closed { rim.differs } else { rim.even }
+            let sides_are_copies = rim.alone_closed || rim.folded && !rim.even;
+            !open && if sides_are_copies { rim.differs } else { rim.even }
         }
     };
     let counted = groups.iter().filter(|(t, _)| !none(t)).map(|(_, sources)| sources[0]).collect();
@@ -272,6 +287,31 @@ fn a_panel_that_was_written_twice_counts_once() {
     assert_eq!((counted(&said), said.stats.duplicate_triangles), (8, 8));
     let thrice = [panel(0.0), panel(0.0), turned(panel(0.0))].concat();
     assert_eq!(counted(&check(&thrice, "thrice")), 8);
+}
+
+#[test]
+fn of_a_panel_whose_sides_are_copies_in_places_all_places_count() {
+    // Around the middle the sides are a hair apart, farther out they are the same.
+    let ring = |lift: f64| -> Vec<Corners> {
+        let square = [[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]].map(|[x, y]| [x, y, 0.5]);
+        let inner = square.map(|p| [0.5 + (p[0] - 0.5) / 2.0, 0.5 + (p[1] - 0.5) / 2.0, 0.5]);
+        let top = [0.5, 0.5, 0.5 + lift];
+        (0..4)
+            .flat_map(|i| {
+                let j = (i + 1) % 4;
+                let outer = [[square[i], square[j], inner[i]], [square[j], inner[j], inner[i]]];
+                // The outermost are never copies.
+                let far = [square[i], square[j], [0.5, 0.5, -lift]];
+                [outer[0], outer[1], [inner[i], inner[j], top], far]
+            })
+            .collect()
+    };
+    let gap = 1e-3;
+    let said = check(&[ring(0.0), turned(ring(gap))].concat(), "pinched");
+    assert_eq!((said.stats.interface_triangles, counted(&said)), (0, 24));
+    // Solids that touch part further.
+    let said = check(&[ring(0.0), turned(ring(0.5))].concat(), "touching");
+    assert_eq!((said.stats.interface_triangles, counted(&said)), (8, 16));
 }
 
 #[test]
