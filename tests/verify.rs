@@ -6,13 +6,15 @@ use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-use brickmend::io::Format;
+use brickmend::io::{Format, ReadOptions, open};
+use brickmend::mesh::TriangleBatch;
 use brickmend::mesh::shapes::{Corners, Random, cuboid, gear, rotation, sphere, torus, transform};
 use brickmend::monitor::Void;
 use brickmend::repair::{
     Depth, Limits, Settings, VERIFICATION_VERSION, Verdict, Verification, VerifySettings, repair,
     verify_file,
 };
+use brickmend::store::Scratch;
 use glam::DVec3;
 use tempfile::TempDir;
 
@@ -433,4 +435,66 @@ fn the_documented_defaults_are_those_of_the_program() {
     ] {
         assert!(page.contains(&format!("| {flag} | `{value}` |")), "{flag} {value}");
     }
+}
+
+/// Corners of a coloured file, and what is red of a colour.
+fn coloured(path: &Path) -> Vec<([f64; 3], u8)> {
+    let scratch = Scratch::new(path.parent().expect("a folder"));
+    let mut source = open(path, &scratch, &ReadOptions::in_scene(1 << 20)).expect("opens");
+    let (mut batch, mut found) = (TriangleBatch::default(), Vec::new());
+    while source.next_batch(&mut batch).expect("readable") {
+        let colours = batch.colours.as_flattened().iter().map(|colour| colour[0]);
+        found.extend(batch.corners.as_flattened().iter().copied().zip(colours));
+    }
+    found
+}
+
+#[test]
+fn coloured_surfaces_show_what_was_lost_and_invented_and_where() {
+    let (plate, ball) = (cuboid([0.0; 3], [4.0, 4.0, 1.0]), sphere([1.0, 1.0, 3.0], 0.5, 12));
+    let block = cuboid([2.0, 2.0, 1.0], [3.0, 3.0, 2.0]);
+    let pair = Pair::new(&[plate.clone(), block].concat(), &[plate, ball].concat());
+    let export = |name: &str, more: &[&str]| {
+        let out = pair.folder.path().join(name);
+        let ended = program(
+            &[&["file.obj", "--against", "original.obj", "--export", name], more].concat(),
+            &pair,
+        );
+        assert!([Some(0), Some(4)].contains(&ended.code), "{}", ended.stderr);
+        out
+    };
+    let out = export("out", &[]);
+    // Grey is where both are the same; all that is hot is the ball or the block.
+    for (name, is_part) in [
+        ("original.ply", (|[_, _, z]: [f64; 3]| z > 2.0) as fn([f64; 3]) -> bool),
+        ("file.ply", |[x, y, z]| {
+            z > 1.0 || x >= 2.0 && x <= 3.0 && y >= 2.0 && y <= 3.0 && z == 1.0
+        }),
+    ] {
+        let corners = coloured(&out.join(name));
+        let grey = corners.iter().filter(|(_, red)| *red == 214).count();
+        assert!(corners.len() > 1000 && grey > 0, "{name}: large faces are cut");
+        for (corner, red) in corners {
+            // The foot of the block lies on the plate.
+            assert!(is_part(corner) || red == 214, "{name}: {corner:?} {red}");
+            assert!(corner[2] <= 1.9 || red != 214, "{name}: {corner:?} {red}");
+        }
+    }
+    let again = export("again", &["--threads", "3", "--max-memory", "64MiB"]);
+    for name in ["original.ply", "file.ply"] {
+        let bytes = |folder: &Path| std::fs::read(folder.join(name)).expect("there");
+        assert_eq!(bytes(&out), bytes(&again), "{name}");
+    }
+}
+
+#[test]
+fn an_export_never_replaces_what_is_compared() {
+    let cube = cuboid([0.0; 3], [1.0; 3]);
+    let pair = Pair::new(&cube, &cube);
+    let path = pair.folder.path().join("file.ply");
+    std::os::unix::fs::symlink(pair.file(), &path).expect("linked");
+    let ended = program(&["file.obj", "--against", "original.obj", "--export", "."], &pair);
+    assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+    assert!(ended.stderr.contains("choose another folder"), "{}", ended.stderr);
+    assert_eq!(std::fs::read_to_string(pair.file()).expect("there"), obj(&cube));
 }

@@ -7,6 +7,7 @@ mod completions;
 mod config;
 mod estimate;
 mod exit_code;
+mod export;
 mod fleet;
 mod inspect;
 mod last_words;

@@ -15,6 +15,7 @@ use clap::Args;
 
 use crate::cli::arguments::{ResourceArguments, parse_size, parse_unit};
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
+use crate::cli::export::Export;
 use crate::cli::numbers::short;
 use crate::cli::progress::{Chatter, Progress, on_one_line};
 use crate::cli::signals::Stop;
@@ -40,6 +41,10 @@ pub struct VerifyArguments {
     /// Most that scratch files may take of the disk, such as 20GB [default: no limit].
     #[arg(long, value_name = "SIZE", value_parser = parse_size, help_heading = "Resources")]
     max_disk: Option<u64>,
+    /// Write both surfaces as PLY into this folder, coloured by how far they lie from each other:
+    /// file.ply shows what FILE invented, original.ply what it lost.
+    #[arg(long, requires = "against", value_name = "DIR", help_heading = "Report")]
+    export: Option<PathBuf>,
     /// Print the verification as JSON on stdout; see docs/verify.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
@@ -139,6 +144,20 @@ pub fn run(arguments: &VerifyArguments, chatter: &Chatter) -> ExitCode {
     match result {
         Ok(verification) => {
             tell(&verification, arguments.json, chatter);
+            if let (Some(folder), Some(original), Some(deviation)) =
+                (&arguments.export, &arguments.against, &verification.deviation)
+            {
+                let export = Export {
+                    folder,
+                    surfaces: [original, &arguments.file],
+                    limits: &limits,
+                    monitor: &progress,
+                };
+                if let Err(error) = export.write(deviation) {
+                    chatter.error(&error);
+                    return if stop.is_asked() { stop.exit() } else { Exit::Unusable }.into();
+                }
+            }
             match verification.verdict {
                 Verdict::Fail => Exit::NoResult.into(),
                 Verdict::Pass | Verdict::Review => Exit::Success.into(),

@@ -18,6 +18,9 @@ pub enum ReportError {
     /// A picture cannot be drawn, or a file cannot be put in place.
     #[error(transparent)]
     Picture(#[from] PreviewError<IoError>),
+    /// A coloured surface cannot be written.
+    #[error("Cannot write the coloured surface")]
+    Export(#[source] IoError),
     /// The page cannot be written.
     #[error("Cannot write {path}")]
     Write {
@@ -46,7 +49,9 @@ impl ReportError {
             Self::Journal(error) => error.blame(),
             Self::Picture(PreviewError::Cancelled) => Blame::Interrupted,
             Self::Picture(PreviewError::ShareTooSmall { .. }) => Blame::Usage,
-            Self::Picture(_) | Self::Write { .. } | Self::Folder { .. } => Blame::Disk,
+            Self::Picture(_) | Self::Export(_) | Self::Write { .. } | Self::Folder { .. } => {
+                Blame::Disk
+            }
         }
     }
 }

@@ -1,4 +1,4 @@
-//! A picture file that is seen under its name only when it is complete.
+//! A file that is seen under its name only when it is complete.
 //!
 //! Invariant:  the target is untouched until [`StagedFile::put_in_place`], and whole afterwards,
 //!             also across a crash; an abandoned file is removed.
@@ -36,6 +36,11 @@ impl StagedFile {
         };
         let file = create().map_err(|source| PreviewError::io("create", &partial, source))?;
         Ok(Self { target: target.to_path_buf(), partial, file })
+    }
+
+    /// Where it is until then, for writers that open files by themselves.
+    pub(crate) fn partial(&self) -> &Path {
+        &self.partial
     }
 
     /// The file to write to.

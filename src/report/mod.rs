@@ -6,6 +6,7 @@
 //! Memory:  what the caller states as a share; see [`preview`].
 
 mod catalogue_page;
+mod coloured;
 mod error;
 mod html;
 mod image_exr;
@@ -17,6 +18,7 @@ mod pictures;
 pub mod preview;
 
 pub use catalogue_page::{FOLDER, INDEX, report_folder, write_catalogue_page};
+pub use coloured::write_coloured;
 pub use error::ReportError;
 pub use model_page::{Gallery, MapOptions, ModelPage, PageOptions, PartsPage, write_model_page};
 pub use preview::{
