@@ -468,7 +468,7 @@ fn coloured_surfaces_show_what_was_lost_and_invented_and_where() {
     for (name, is_part) in [
         ("original.ply", (|[_, _, z]: [f64; 3]| z > 2.0) as fn([f64; 3]) -> bool),
         ("file.ply", |[x, y, z]| {
-            z > 1.0 || x >= 2.0 && x <= 3.0 && y >= 2.0 && y <= 3.0 && z == 1.0
+            z > 1.0 || z == 1.0 && [x, y].iter().all(|c| (2.0..=3.0).contains(c))
         }),
     ] {
         let corners = coloured(&out.join(name));
