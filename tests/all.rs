@@ -18,6 +18,7 @@ mod guarantee;
 mod hidden;
 mod hostile;
 mod inspect;
+mod inspect_export;
 mod levels;
 mod materials;
 mod mend;

@@ -8,7 +8,7 @@ use std::process::ExitCode;
 use brickmend::defect::{Defect, DefectKind};
 use brickmend::diagnose::{Finding, Measure};
 use brickmend::mesh::LengthUnit;
-use brickmend::repair::{InspectSettings, Inspection, Length, RepairCost, inspect};
+use brickmend::repair::{InspectSettings, Inspection, Length, RepairCost, inspect_exporting};
 use clap::Args;
 
 use crate::cli::arguments::{ResourceArguments, parse_unit};
@@ -40,12 +40,21 @@ pub struct InspectArguments {
     /// What a model unit is, for files that do not say so.
     #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
     units: Option<LengthUnit>,
+    /// Write all edges and triangles with a defect into this folder, one PLY for each kind that is
+    /// found; of one FILE. See docs/inspect.md.
+    #[arg(long, value_name = "DIR")]
+    export: Option<PathBuf>,
     #[command(flatten)]
     resources: ResourceArguments,
     /// Print each report as one line of JSON on stdout; see docs/inspect.md.
     #[arg(long, help_heading = "Report")]
     json: bool,
 }
+
+/// Files of the same names would come from each.
+#[derive(Debug, thiserror::Error)]
+#[error("--export takes one FILE; inspect the others by themselves")]
+struct SeveralExports;
 
 /// Runs the command: a report for each file, a line for each that cannot be read.
 pub fn run(arguments: &InspectArguments, chatter: &Chatter) -> ExitCode {
@@ -56,6 +65,10 @@ pub fn run(arguments: &InspectArguments, chatter: &Chatter) -> ExitCode {
             return Exit::Internal.into();
         }
     };
+    if arguments.export.is_some() && arguments.inputs.len() > 1 {
+        chatter.error(&SeveralExports);
+        return Exit::Usage.into();
+    }
     let settings = InspectSettings {
         thin: arguments.thin,
         tiny: arguments.tiny,
@@ -67,7 +80,8 @@ pub fn run(arguments: &InspectArguments, chatter: &Chatter) -> ExitCode {
     let mut failure = None;
     for input in &arguments.inputs {
         let progress = Progress::new(*chatter, stop.clone());
-        let result = inspect(input, &settings, &limits, &progress);
+        let result =
+            inspect_exporting(input, &settings, arguments.export.as_deref(), &limits, &progress);
         progress.clear();
         match result {
             Ok(inspection) => {

@@ -2,7 +2,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::defect::{Defect, DefectKind, DuplicateTriangle, Smallest};
+use crate::defect::{Defect, DefectKind, DuplicateTriangle, Marks, Smallest};
 use crate::diagnose::Means;
 use crate::diagnose::finding::{Finding, Measure};
 use crate::diagnose::model::Model;
@@ -29,7 +29,11 @@ impl Record for Named {
 }
 
 /// Finds all of them; each but the first of its kind is one.
-pub(crate) fn find(model: &Model, means: &Means<'_>) -> Result<Finding, StoreError> {
+pub(crate) fn find(
+    model: &Model,
+    marks: Option<&Marks>,
+    means: &Means<'_>,
+) -> Result<Finding, StoreError> {
     let mut sorter = Sorter::new(means.scratch, means.share_bytes / 2);
     model.each(means, |triangle| {
         if triangle.is_whole() {
@@ -58,6 +62,9 @@ pub(crate) fn find(model: &Model, means: &Means<'_>) -> Result<Finding, StoreErr
             Some(first) => {
                 count += 1;
                 area += next.area;
+                if let Some(marks) = marks {
+                    marks.triangles(DefectKind::DuplicateTriangle, &[next.triangle])?;
+                }
                 let copy = DuplicateTriangle {
                     triangles: [first.triangle.into(), next.triangle.into()],
                     is_reversed: first.is_odd != next.is_odd,

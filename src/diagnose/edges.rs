@@ -8,6 +8,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::defect::{DefectKind, Marks};
 use crate::diagnose::Means;
 use crate::diagnose::model::{BLOCK, Model};
 use crate::store::{Labels, Record, Sequence, SequencePeek, Sorter, StoreError, Unite};
@@ -103,6 +104,20 @@ impl Edges {
         drop(sorted);
         joining.finish(means)
     }
+}
+
+/// Marks all edges that have not two triangles, one each way, by their first side.
+pub(crate) fn mark(sides: &Sequence<Side>, marks: &Marks) -> Result<(), StoreError> {
+    sides.each_block(BLOCK, |block| {
+        block.iter().filter(|side| side.is_first == 1).try_for_each(|side| {
+            let kind = match side.triangles {
+                1 => DefectKind::BoundaryEdge,
+                2 => DefectKind::InconsistentEdge,
+                _ => DefectKind::NonmanifoldEdge,
+            };
+            marks.edge(kind, side.side / 3, side.side % 3)
+        })
+    })
 }
 
 struct Joining {

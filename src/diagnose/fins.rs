@@ -1,6 +1,6 @@
 //! Sheets that hang from others by an edge.
 
-use crate::defect::{Defect, DefectKind, Fin};
+use crate::defect::{Defect, DefectKind, Fin, Marks};
 use crate::diagnose::Means;
 use crate::diagnose::edges::Side;
 use crate::diagnose::finding::{Finding, Measure, SizedPlaces};
@@ -13,6 +13,7 @@ pub(crate) fn find(
     model: &Model,
     sheets: &mut Labels,
     sides: &Sequence<Side>,
+    marks: Option<&Marks>,
     means: &Means<'_>,
 ) -> Result<Finding, StoreError> {
     let kind = DefectKind::Fin;
@@ -37,6 +38,18 @@ pub(crate) fn find(
             };
             largest.offer(sums.area, sums.first, Defect::Fin(fin));
         }
+    }
+    if let Some(marks) = marks.filter(|_| count > 0) {
+        model.each(means, |triangle| {
+            if !triangle.is_whole() {
+                return Ok(());
+            }
+            let set = sets.set_of.get(triangle.number)?;
+            match sets.sums.get(set.into())?.is_fin() {
+                true => marks.triangles(kind, &[triangle.number as u32]),
+                false => Ok(()),
+            }
+        })?;
     }
     Ok(Finding::sized(kind, count, (Measure::TotalArea, area), largest.into_places()))
 }

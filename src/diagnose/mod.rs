@@ -25,6 +25,7 @@ mod hidden;
 mod inverted;
 mod isolated;
 mod loops;
+mod marked;
 mod model;
 mod near;
 mod ownership;
@@ -44,6 +45,7 @@ pub use model::{Model, ModelFacts, ModelSource};
 pub use ownership::{Owner, Owners};
 pub use shells::{ShellReport, ShellSummary};
 
+use crate::defect::Marks;
 use crate::diagnose::edges::Edges;
 use crate::diagnose::shells::Shells;
 #[cfg(doc)]
@@ -95,27 +97,31 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
 }
 
-/// Looks at a model that has been read.
+/// Looks at a model that has been read, and marks all edges and triangles of [`Marks`] if asked.
 ///
 /// # Errors
 /// The scratch disk fails, or the monitor asks to stop.
 pub fn diagnose(
     model: &Model,
     tolerances: &Tolerances,
+    marks: Option<&Marks>,
     means: &Means<'_>,
 ) -> Result<Diagnosis, StoreError> {
     let mut findings = Vec::new();
-    findings.push(duplicates::find(model, means)?);
+    findings.push(duplicates::find(model, marks, means)?);
     findings.push(isolated::find(model, means)?);
     findings.push(model.coincident());
     // What a look needs no more goes before the next one begins: each has most of the share.
     let Edges { shells: mut labels, mut sheets, sides, count } = Edges::find(model, means)?;
-    findings.push(fins::find(model, &mut sheets, &sides, means)?);
+    findings.push(fins::find(model, &mut sheets, &sides, marks, means)?);
     drop(sheets);
+    if let Some(marks) = marks {
+        edges::mark(&sides, marks)?;
+    }
     let mut shells = Shells::measure(model, &mut labels, &sides, means)?;
     drop(labels);
     findings.push(inverted::find(model, &mut shells, means)?);
-    findings.push(hidden::find(model, &mut shells, means)?);
+    findings.push(hidden::find(model, &mut shells, marks, means)?);
     let (report, mut of_shells) = shells.report(tolerances.tiny, means)?;
     findings.append(&mut of_shells);
     drop(shells);

@@ -24,7 +24,7 @@ fn look(mut source: ListedTriangles, share_bytes: u64) -> (Diagnosis, ModelFacts
     let diagonal = DVec3::from(low).distance(DVec3::from(high));
     let tolerances =
         Tolerances { thin: 0.002 * diagonal, tiny: 0.005 * diagonal, junction: 1e-6 * diagonal };
-    let diagnosis = diagnose(&model, &tolerances, &means).expect("the scratch folder works");
+    let diagnosis = diagnose(&model, &tolerances, None, &means).expect("the scratch folder works");
     (diagnosis, facts)
 }
 

@@ -66,6 +66,7 @@ use crate::io::off::{OffReader, OffWriter};
 pub use crate::io::output::{ASIDE, check_output};
 pub use crate::io::packed::content_name as unpacked_name;
 pub use crate::io::palette::{IMAGES, LookMap, MATERIALS, Palette, PaletteWriter};
+pub use crate::io::ply::{LooseKind, LooseShape, write_loose_shapes};
 use crate::io::ply::{PlyReader, PlyWriter};
 pub use crate::io::scene::{NODES, SEEN_NODES, SceneTree, SceneWriter};
 use crate::io::stl::{StlWriter, open_stl};

@@ -1,7 +1,7 @@
 //! The order of an inspection: read, prove, diagnose, estimate.
 //!
 //! In:         a model file, [`InspectSettings`], [`Limits`].
-//! Out:        an [`Inspection`]; nothing else is written.
+//! Out:        an [`Inspection`]; and files of what was found, if a folder is given for them.
 //! Invariant:  depends on the file and the settings alone. Scratch files have no names: nothing is
 //!             left of them, however the process ends.
 //! Memory:     [`Limits::max_memory_bytes`].
@@ -13,7 +13,8 @@ use std::path::Path;
 use rayon::ThreadPoolBuilder;
 
 use crate::defect::{
-    Defect, DefectKind, IntersectingTriangles, Meeting, OverlappingTriangles, TouchingTriangles,
+    Defect, DefectKind, IntersectingTriangles, Marks, Meeting, OverlappingTriangles,
+    TouchingTriangles,
 };
 use crate::diagnose::{
     DiagnoseError, Diagnosis, Finding, Means, Measure, Model, ModelFacts, Tolerances, diagnose,
@@ -23,6 +24,7 @@ use crate::io::{Format, IoError, ReadOptions};
 use crate::monitor::{Monitor, Stage};
 use crate::octree::SnapBox;
 use crate::repair::estimate::estimate;
+use crate::repair::inspect_export;
 use crate::repair::inspection::{
     INSPECTION_VERSION, InspectSettings, Inspection, ModelSize, RepairCost, ToleranceReport,
 };
@@ -31,7 +33,9 @@ use crate::repair::plan::MemoryPlan;
 use crate::repair::settings::{Limits, Settings};
 use crate::repair::{Blame, RepairError};
 use crate::store::{Scratch, StoreError};
-use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, VerifyError, Vertices, prove};
+use crate::verify::{
+    Outward, Proof, ProofOptions, ProvedSource, VerifyError, Vertices, prove_marking,
+};
 
 /// Tells what is wrong with the model at `input`, and what a repair would take.
 ///
@@ -45,6 +49,24 @@ pub fn inspect(
     limits: &Limits,
     monitor: &dyn Monitor,
 ) -> Result<Inspection, RepairError> {
+    inspect_exporting(input, settings, None, limits, monitor)
+}
+
+/// [`inspect`], and writes all triangles and edges of the kinds of [`Marks`] into the folder
+/// `export`, one PLY for each kind that is found.
+///
+/// # Errors
+/// As [`inspect`]; the folder cannot be written, or one of its files would be the input.
+pub fn inspect_exporting(
+    input: &Path,
+    settings: &InspectSettings,
+    export: Option<&Path>,
+    limits: &Limits,
+    monitor: &dyn Monitor,
+) -> Result<Inspection, RepairError> {
+    if let Some(folder) = export {
+        inspect_export::prepare(folder, input)?;
+    }
     let plan = MemoryPlan::within(limits)?;
     let scratch = Scratch::new(limits.work_dir.as_deref().unwrap_or(Path::new(".")));
     let share_bytes = plan.share_bytes;
@@ -66,17 +88,22 @@ pub fn inspect(
         vertices: Vertices::Numbers,
         intersections: true,
     };
+    // Of the share this is what neither the model nor any look takes.
+    let marks = export.map(|_| Marks::new(&scratch, share_bytes / 32));
     let mut open =
         || -> Result<ProvedSource<'_, StoreError>, StoreError> { Ok(Box::new(model.source())) };
-    let proof =
-        prove(&mut open, &scratch, &options, &pool, monitor).map_err(|error| match error {
+    let proof = prove_marking(&mut open, &scratch, &options, marks.as_ref(), &pool, monitor)
+        .map_err(|error| match error {
             VerifyError::Source { source } | VerifyError::Store(source) => {
                 RepairError::Store(source)
             }
         })?;
     drop(pool);
     let means = Means { scratch: &scratch, share_bytes, monitor };
-    let diagnosis = diagnose(&model, &tolerances, &means)?;
+    let diagnosis = diagnose(&model, &tolerances, marks.as_ref(), &means)?;
+    if let (Some(folder), Some(marks)) = (export, marks) {
+        inspect_export::write(folder, &model, marks, &means)?;
+    }
     let has_names = model.has_names();
     let facts = facts.clone();
     drop(model);

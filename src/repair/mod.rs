@@ -14,6 +14,7 @@ mod error;
 mod estimate;
 mod finish;
 mod inspect;
+mod inspect_export;
 mod inspection;
 mod length;
 mod levels;
@@ -41,7 +42,7 @@ mod writing;
 pub use deeper::DepthTrial;
 pub use error::{Blame, RepairError};
 pub use estimate::{Bounds, Counts, DiskSteps, ESTIMATE_VERSION, Estimate, estimate};
-pub use inspect::inspect;
+pub use inspect::{inspect, inspect_exporting};
 pub use inspection::{
     INSPECTION_VERSION, InspectSettings, Inspection, ModelSize, RepairCost, ToleranceReport,
 };

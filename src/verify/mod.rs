@@ -44,7 +44,7 @@ use std::error::Error;
 
 use rayon::ThreadPool;
 
-use crate::defect::{Defect, IntersectingTriangles, Meeting};
+use crate::defect::{Defect, IntersectingTriangles, Marks, Meeting};
 use crate::mesh::MeshSource;
 use crate::monitor::{Monitor, Stage};
 use crate::store::{Scratch, StoreError};
@@ -115,11 +115,26 @@ pub fn prove<'s, E: Error + Send>(
     pool: &ThreadPool,
     monitor: &dyn Monitor,
 ) -> Result<Proof, VerifyError<E>> {
+    prove_marking(open, scratch, options, None, pool, monitor)
+}
+
+/// [`prove`], and marks all triangles of pairs that cross, overlap or touch.
+///
+/// # Errors
+/// As [`prove`].
+pub fn prove_marking<'s, E: Error + Send>(
+    open: &mut dyn FnMut() -> Result<ProvedSource<'s, E>, E>,
+    scratch: &Scratch,
+    options: &ProofOptions,
+    marks: Option<&Marks>,
+    pool: &ThreadPool,
+    monitor: &dyn Monitor,
+) -> Result<Proof, VerifyError<E>> {
     monitor.begin(Stage::Verify, 0);
     let mut start = || open().map_err(|source| VerifyError::Source { source });
     let asked = || {
         let wanted = options.intersections;
-        wanted.then(|| Intersections::new(scratch, options.share_bytes, pool))
+        wanted.then(|| Intersections::new(scratch, options.share_bytes, pool).marking(marks))
     };
     let mut intersections = asked();
     let sound = prove_sound(&mut *start()?, scratch, options, intersections.as_mut(), monitor)?;

@@ -4,6 +4,7 @@
 //! Out:        how many pairs of triangles intersect, and the first of them.
 //! Memory:     about 230 bytes a triangle, 500 at most.
 
+use crate::defect::Marks;
 use crate::geom::signs::{Point, is_tame};
 use crate::store::StoreError;
 use crate::verify::intersect::arrival::Unpacked;
@@ -90,7 +91,12 @@ pub(crate) struct Workbench {
 
 impl Workbench {
     /// Tests all pairs of a cell.
-    pub(crate) fn join(&mut self, task: &CellTask, wide: &WidePairs) -> Result<Found, StoreError> {
+    pub(crate) fn join(
+        &mut self,
+        task: &CellTask,
+        wide: &WidePairs,
+        marks: Option<&Marks>,
+    ) -> Result<Found, StoreError> {
         let border = if task.named {
             self.unpack(task, |unpacked, at, _| unpacked.names[at])
         } else {
@@ -122,6 +128,7 @@ impl Workbench {
             found: Found::new(),
             kept: Vec::new(),
             wide,
+            marks,
             failure: None,
         };
         let leaves_out = |a: u32, b: u32| {

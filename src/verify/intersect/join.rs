@@ -11,6 +11,7 @@ use std::sync::{Mutex, PoisonError};
 
 use rayon::ThreadPool;
 
+use crate::defect::Marks;
 use crate::monitor::Monitor;
 use crate::store::{Scratch, Sequence, Sorter, StoreError, ordered};
 use crate::verify::intersect::cell::{Cell, CellTask, Workbench};
@@ -69,6 +70,8 @@ impl Shares {
 /// What a join works with.
 pub(crate) struct Join<'p> {
     pub(crate) scratch: &'p Scratch,
+    /// Who wants to know of all pairs.
+    pub(crate) marks: Option<&'p Marks>,
     pub(crate) shares: Shares,
     pub(crate) monitor: &'p dyn Monitor,
 }
@@ -82,7 +85,7 @@ impl Join<'_> {
         packer: Packer,
         pool: &ThreadPool,
     ) -> Result<Found, StoreError> {
-        let monitor = self.monitor;
+        let Self { monitor, marks, .. } = self;
         let wide: WidePairs = Mutex::new(Sorter::new(self.scratch, self.shares.wide_pair_bytes()));
         let mut found = Found::new();
         let mut cells = Cells::new(self, Level::new(grid, shift, packer)?);
@@ -90,7 +93,7 @@ impl Join<'_> {
             pool,
             || cells.next_task(),
             Workbench::default,
-            |bench, task: CellTask| bench.join(&task, &wide),
+            |bench, task: CellTask| bench.join(&task, &wide, marks),
             |of_cell| {
                 found.add(&of_cell);
                 monitor.advance(of_cell.triangles);
@@ -168,7 +171,7 @@ impl<'p> Cells<'p> {
     }
 
     fn next_task(&mut self) -> Result<Option<CellTask>, StoreError> {
-        let Join { scratch, shares, monitor } = self.join;
+        let Join { scratch, shares, monitor, .. } = self.join;
         loop {
             stop_if_asked(monitor)?;
             let depth = self.levels.len();

@@ -9,7 +9,7 @@ use std::sync::{Mutex, PoisonError};
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::defect::{Meeting, MeetingCounts, Smallest};
+use crate::defect::{DefectKind, Marks, Meeting, MeetingCounts, Smallest};
 use crate::geom::signs::Point;
 use crate::store::{Record, Sorter, StoreError};
 use crate::verify::intersect::grid::box_of;
@@ -81,6 +81,7 @@ pub(crate) struct Judge<'b> {
     pub(crate) found: Found,
     pub(crate) kept: Vec<WidePair>,
     pub(crate) wide: &'b WidePairs,
+    pub(crate) marks: Option<&'b Marks>,
     pub(crate) failure: Option<StoreError>,
 }
 
@@ -100,9 +101,11 @@ impl Judge<'_> {
     fn enter(&mut self, a: usize, b: usize, sharing: Sharing) {
         let corner = |vertex: u32| self.positions[vertex as usize];
         let place = middle_of_overlap([a, b].map(|at| self.faces[at].vertices.map(corner)));
-        let meeting = meeting_of(sharing, &self.faces[a], &self.faces[b], self.positions) as u64;
+        let meeting = meeting_of(sharing, &self.faces[a], &self.faces[b], self.positions);
         let numbers = [self.numbers[a], self.numbers[b]];
         let pair = [numbers[0].min(numbers[1]), numbers[0].max(numbers[1])];
+        self.mark(pair, meeting);
+        let meeting = meeting as u64;
         if self.is_wide[a] || self.is_wide[b] {
             self.kept.push(WidePair { pair, place, meeting });
             if self.kept.len() == MOST_KEPT {
@@ -110,6 +113,20 @@ impl Judge<'_> {
             }
         } else {
             self.found.count(pair, place, meeting);
+        }
+    }
+
+    /// Marks both triangles; copies are told by who compares corners.
+    fn mark(&mut self, pair: Pair, meeting: Meeting) {
+        let kind = match meeting {
+            Meeting::Crossing => DefectKind::IntersectingTriangles,
+            Meeting::Overlapping => DefectKind::OverlappingTriangles,
+            Meeting::Touching => DefectKind::TouchingTriangles,
+            Meeting::Duplicate => return,
+        };
+        let Some(marks) = self.marks else { return };
+        if let Err(error) = marks.triangles(kind, &pair.map(|number| number as u32)) {
+            self.failure.get_or_insert(error);
         }
     }
 

@@ -42,6 +42,7 @@ pub(crate) use judge::Found;
 
 use rayon::ThreadPool;
 
+use crate::defect::Marks;
 use crate::geom::signs::Point;
 use crate::monitor::Monitor;
 use crate::store::{Scratch, StoreError};
@@ -59,6 +60,7 @@ const MOST_ROW: f64 = 40.0;
 /// Triangles on their way into the cells of a grid.
 pub(crate) struct Intersections<'p> {
     scratch: &'p Scratch,
+    marks: Option<&'p Marks>,
     shares: Shares,
     early: Vec<Early>,
     placed: Option<Placed>,
@@ -87,7 +89,12 @@ impl<'p> Intersections<'p> {
     /// No triangles yet.
     pub(crate) fn new(scratch: &'p Scratch, share_bytes: u64, pool: &ThreadPool) -> Self {
         let shares = Shares::new(share_bytes, pool.current_num_threads());
-        Self { scratch, shares, early: Vec::new(), placed: None }
+        Self { scratch, marks: None, shares, early: Vec::new(), placed: None }
+    }
+
+    /// Marks the triangles of all pairs as well.
+    pub(crate) fn marking(self, marks: Option<&'p Marks>) -> Self {
+        Self { marks, ..self }
     }
 
     /// Takes a triangle with an area.
@@ -142,7 +149,7 @@ impl<'p> Intersections<'p> {
             None => self.place_early()?,
         };
         let (grid, shift, packer) = placed.settle()?;
-        let join = Join { scratch: self.scratch, shares: self.shares, monitor };
+        let join = Join { scratch: self.scratch, marks: self.marks, shares: self.shares, monitor };
         join.run(grid, shift, packer, pool)
     }
 }
