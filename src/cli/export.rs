@@ -21,7 +21,10 @@ pub(crate) struct Export<'e> {
 
 impl Export<'_> {
     /// Writes both coloured surfaces; a sixth of the memory budget is for measuring.
-    pub(crate) fn write(&self, deviation: &Deviation) -> Result<(), ExportError> {
+    pub(crate) fn write(&self, deviation: Option<&Deviation>) -> Result<(), ExportError> {
+        let Some(deviation) = deviation else {
+            return Err(ExportError::NoArea { path: self.folder.to_path_buf() });
+        };
         let [original, file] = self.surfaces;
         let failed = |source| ExportError::Folder { path: self.folder.to_path_buf(), source };
         std::fs::create_dir_all(self.folder).map_err(failed)?;
@@ -49,7 +52,9 @@ impl Export<'_> {
             if is_model {
                 return Err(ExportError::OverModel { path });
             }
-            write_coloured(&path, &scene, side, (largest, share_bytes))?;
+            if !write_coloured(&path, &scene, side, (largest, share_bytes))? {
+                return Err(ExportError::NoArea { path });
+            }
         }
         Ok(())
     }
@@ -70,6 +75,12 @@ pub(crate) enum ExportError {
     #[error("{path} is a model that is compared; choose another folder for --export")]
     OverModel {
         /// The model.
+        path: PathBuf,
+    },
+    /// There is nothing to measure.
+    #[error("{path} is not written: one of the two models has no area")]
+    NoArea {
+        /// The file, or the folder of both.
         path: PathBuf,
     },
     /// A surface cannot be written.

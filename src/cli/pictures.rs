@@ -14,6 +14,7 @@ use brickmend::store::Scratch;
 
 /// Width and height of a view of an EXR file: there are many.
 const LAYER_PX: u32 = 512;
+
 /// A model before and after.
 pub(crate) struct Pictured<'a> {
     pub(crate) input: &'a Path,

@@ -144,16 +144,14 @@ pub fn run(arguments: &VerifyArguments, chatter: &Chatter) -> ExitCode {
     match result {
         Ok(verification) => {
             tell(&verification, arguments.json, chatter);
-            if let (Some(folder), Some(original), Some(deviation)) =
-                (&arguments.export, &arguments.against, &verification.deviation)
-            {
+            if let (Some(folder), Some(original)) = (&arguments.export, &arguments.against) {
                 let export = Export {
                     folder,
                     surfaces: [original, &arguments.file],
                     limits: &limits,
                     monitor: &progress,
                 };
-                if let Err(error) = export.write(deviation) {
+                if let Err(error) = export.write(verification.deviation.as_ref()) {
                     chatter.error(&error);
                     return if stop.is_asked() { stop.exit() } else { Exit::Unusable }.into();
                 }

@@ -15,6 +15,9 @@ use crate::store::{Scratch, Sequence};
 /// Shapes at one time.
 const BLOCK: usize = 1024;
 
+/// Viewers expect numbers of vertices as `int`.
+const MOST_VERTICES: u64 = i32::MAX as u64;
+
 /// A triangle, or an edge by its first two points; model units.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
@@ -46,7 +49,7 @@ impl LooseKind {
 /// Writes `shapes` to `path`; `comment` is one line of the header.
 ///
 /// # Errors
-/// The file cannot be written, or the scratch disk fails.
+/// There are too many shapes, the file cannot be written, or the scratch disk fails.
 pub fn write_loose_shapes(
     path: &Path,
     comment: &str,
@@ -55,6 +58,9 @@ pub fn write_loose_shapes(
     scratch: &Scratch,
 ) -> Result<(), IoError> {
     let corners = kind.corners();
+    if shapes.len() * corners as u64 > MOST_VERTICES {
+        return Err(IoError::too_many(path, "vertices of one kind of defect", MOST_VERTICES));
+    }
     let mut output = Output::create(path, scratch)?;
     output.write(head(comment, kind, shapes.len()).as_bytes())?;
     let mut buffer = Vec::new();
