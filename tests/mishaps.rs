@@ -111,8 +111,9 @@ fn a_worker_that_gets_no_memory_is_tried_again_with_all_of_it() {
     // All that it asks for from now on is refused.
     let none = Rlimit { current: Some(1 << 20), maximum: Some(1 << 20) };
     prlimit(Some(worker), Resource::As, none).expect("it is of our run");
-    assert_eq!(batch.wait().expect("it is ours").code(), Some(0));
+    let code = batch.wait().expect("it is ours").code();
     let endings = endings(&library);
+    assert_eq!(code, Some(0), "{endings:?}");
     // A thread that cannot even be started ends the worker otherwise.
     assert!(["memory", "crash"].contains(&endings[0].as_str()), "{endings:?}");
     assert_eq!(endings[1..], ["repaired"]);

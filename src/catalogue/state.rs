@@ -97,6 +97,7 @@ impl From<Blame> for Cause {
             Blame::Lock => Self::Lock,
             Blame::Input => Self::Input,
             Blame::Temporary => Self::Temporary,
+            Blame::Memory => Self::Memory,
             Blame::Interrupted => Self::Stopped,
             Blame::Limit => Self::DiskLimit,
         }

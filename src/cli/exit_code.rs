@@ -54,7 +54,7 @@ impl From<Blame> for Exit {
             Blame::Disk => Self::Unusable,
             Blame::Lock => Self::Locked,
             Blame::Input => Self::Input,
-            Blame::Temporary => Self::Temporary,
+            Blame::Temporary | Blame::Memory => Self::Temporary,
             Blame::Interrupted => Self::Interrupted,
             Blame::Limit => Self::Stopped,
         }

@@ -211,6 +211,8 @@ pub enum Blame {
     Input,
     /// Nobody's in particular: the same command may well work the next time.
     Temporary,
+    /// The system's, which gave less memory than there was to be.
+    Memory,
     /// The caller's: interrupted.
     Interrupted,
     /// A limit that the user set: stopped on the way, to be gone on with.
@@ -221,6 +223,9 @@ impl RepairError {
     /// Whose fault it is.
     #[must_use]
     pub fn blame(&self) -> Blame {
+        if self.is_memory_short() {
+            return Blame::Memory;
+        }
         match self {
             Self::Input(error) if error.is_input() => Blame::Input,
             Self::Input(IoError::Store(error)) => blame_store(error),
@@ -256,16 +261,33 @@ impl RepairError {
             | Self::Sign(_)
             | Self::Contour(_)
             | Self::Transfer(_)
-            | Self::ReadBack(_)
-            | Self::Threads { .. } => Blame::Internal,
+            | Self::ReadBack(_) => Blame::Internal,
+            // What a thread needs of the system is its stack.
+            Self::Threads { .. } => Blame::Memory,
         }
+    }
+
+    /// Whether the system had no memory for a mapping, whatever the file it was to be of.
+    fn is_memory_short(&self) -> bool {
+        let mut cause: Option<&dyn std::error::Error> = Some(self);
+        while let Some(error) = cause {
+            let system: Option<&std::io::Error> = error.downcast_ref();
+            if system.is_some_and(|error| error.kind() == std::io::ErrorKind::OutOfMemory) {
+                return true;
+            }
+            cause = error.source();
+        }
+        false
     }
 
     /// Whether the work folder may serve a later run, or explain this one.
     #[must_use]
     pub fn keeps_work(&self) -> bool {
         let blame = self.blame();
-        matches!(blame, Blame::Internal | Blame::Disk | Blame::Interrupted | Blame::Limit)
+        matches!(
+            blame,
+            Blame::Internal | Blame::Disk | Blame::Memory | Blame::Interrupted | Blame::Limit
+        )
     }
 
     /// The file of the work folder whose bytes are not those that were written, if that is it.
@@ -333,5 +355,25 @@ fn blame_store(error: &StoreError) -> Blame {
         StoreError::DiskLimit { .. } => Blame::Limit,
         StoreError::TooMany { .. } | StoreError::OverBudget { .. } => Blame::Usage,
         _ => Blame::Disk,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn memory_that_the_system_refused_is_its_fault_whatever_file_it_was_for() {
+        let refused = || std::io::Error::from(std::io::ErrorKind::OutOfMemory);
+        let store = || StoreError::io("map", Path::new("a.bricks"), refused());
+        let input = IoError::input("map", Path::new("a.stl"), refused());
+        for error in [
+            RepairError::Store(store()),
+            RepairError::Sign(SignError::Store(store())),
+            RepairError::Input(input),
+        ] {
+            assert_eq!(error.blame(), Blame::Memory, "{error}");
+            assert!(error.keeps_work());
+        }
     }
 }
