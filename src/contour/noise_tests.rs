@@ -16,7 +16,7 @@ use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use crate::monitor::Void;
 use crate::octree::{
     BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SnapBox,
-    SourcePlane, decode_cells, edge_position, encode,
+    SourcePlane, decode_cells, edge_position, encode, face_index, for_each_ambiguous_face,
 };
 use crate::store::{Backing, BrickFile, BrickWriter, NoCheckpoints, Resources, Scratch};
 use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
@@ -65,6 +65,8 @@ pub struct Field {
     pub seed: u64,
     pub inside_share: f64,
     pub patch_share: f64,
+    /// Of ambiguous faces, those that are walled.
+    pub wall_share: f64,
     pub decimate_cells: f64,
 }
 
@@ -101,7 +103,16 @@ impl Field {
     fn brick(&self, position: [u32; 3], cell: f64) -> SignBrick {
         let base = position.map(|c| c as usize * SIDE);
         let hit = |axis, at| self.hit(axis, at, base, cell);
-        brick_at(base, |at| self.is_inside(at), hit)
+        let mut brick = brick_at(base, |at| self.is_inside(at), hit);
+        let mut marks = EdgeBits::default();
+        brick.crossings.iter().for_each(|crossing| marks.set(crossing.edge));
+        for_each_ambiguous_face(&marks, |axis, at| {
+            let place = std::array::from_fn(|a| base[a] + at[a]);
+            if self.random_at(4 + axis as u64, place).share() < self.wall_share {
+                brick.walls.push(face_index(axis, at));
+            }
+        });
+        brick
     }
 }
 
@@ -265,19 +276,30 @@ fn assert_sound(found: &Contoured, name: &str) {
 
 #[test]
 fn the_surface_of_noise_is_closed_and_manifold() {
-    for (seed, inside_share, patch_share) in
-        [(1, 0.5, 0.5), (2, 0.2, 0.5), (3, 0.5, 0.0), (4, 0.2, 0.0), (5, 0.8, 0.1)]
-    {
-        let field = Field { seed, inside_share, patch_share, decimate_cells: 0.0 };
+    for (seed, inside_share, patch_share, wall_share) in [
+        (1, 0.5, 0.5, 0.0),
+        (2, 0.2, 0.5, 0.5),
+        (3, 0.5, 0.0, 1.0),
+        (4, 0.2, 0.0, 1.0),
+        (5, 0.8, 0.1, 0.2),
+        (8, 0.5, 0.3, 0.1),
+    ] {
+        let field = Field { seed, inside_share, patch_share, wall_share, decimate_cells: 0.0 };
         let found = contour(&field, Backing::Memory, 1);
-        assert_sound(&found, &format!("{inside_share} inside, {patch_share} patched"));
+        assert_sound(&found, &format!("{inside_share} inside, {wall_share} walled"));
         assert!(found.proof.triangles > 10_000);
     }
 }
 
 #[test]
 fn noise_in_mapped_bricks_and_on_more_threads_is_the_same() {
-    let field = Field { seed: 6, inside_share: 0.5, patch_share: 0.3, decimate_cells: 0.0 };
+    let field = Field {
+        seed: 6,
+        inside_share: 0.5,
+        patch_share: 0.3,
+        wall_share: 0.5,
+        decimate_cells: 0.0,
+    };
     let one = contour(&field, Backing::Memory, 1);
     assert_sound(&one, "in memory");
     for (backing, threads) in [(Backing::Mapped, 1), (Backing::Mapped, 4), (Backing::Memory, 4)] {
@@ -289,7 +311,13 @@ fn noise_in_mapped_bricks_and_on_more_threads_is_the_same() {
 
 #[test]
 fn flipped_faces_occur_in_noise_and_are_needed() {
-    let field = Field { seed: 7, inside_share: 0.5, patch_share: 1.0, decimate_cells: 0.0 };
+    let field = Field {
+        seed: 7,
+        inside_share: 0.5,
+        patch_share: 1.0,
+        wall_share: 0.0,
+        decimate_cells: 0.0,
+    };
     let found = contour(&field, Backing::Memory, 1);
     assert_sound(&found, "all patched");
     assert!(found.stats.flipped_faces > 0 && found.stats.flipped_faces.is_multiple_of(2));
@@ -298,14 +326,15 @@ fn flipped_faces_occur_in_noise_and_are_needed() {
 #[test]
 fn clusters_of_noise_are_sound_at_any_threshold() {
     let mut clusters = 0;
-    for (seed, inside_share, patch_share, decimate_cells) in [
-        (11, 0.5, 0.5, 0.3),
-        (12, 0.2, 0.0, 0.7),
-        (13, 0.5, 0.0, 1.1),
-        (14, 0.05, 0.2, 2.0),
-        (15, 0.9, 1.0, 5.0),
+    for (seed, inside_share, patch_share, wall_share, decimate_cells) in [
+        (11, 0.5, 0.5, 0.0, 0.3),
+        (12, 0.2, 0.0, 0.5, 0.7),
+        (13, 0.5, 0.0, 0.3, 1.1),
+        (14, 0.05, 0.2, 1.0, 2.0),
+        (15, 0.9, 1.0, 0.0, 5.0),
+        (16, 0.3, 0.1, 1.0, 5.0),
     ] {
-        let field = Field { seed, inside_share, patch_share, decimate_cells };
+        let field = Field { seed, inside_share, patch_share, wall_share, decimate_cells };
         let found = contour(&field, Backing::Memory, 1);
         assert_sound(&found, &format!("{inside_share} inside, {decimate_cells} cells"));
         clusters += found.stats.clusters;

@@ -13,6 +13,7 @@ use rkyv::ser::sharing::Share;
 use rkyv::util::AlignedVec;
 use rkyv::{Archive, Deserialize, Serialize};
 
+use crate::octree::ambiguous::OWN_FACES;
 use crate::octree::border::{ArchivedBorder, Border, check_borders};
 use crate::octree::edge_bits::AXIS_EDGES;
 
@@ -153,6 +154,8 @@ pub struct SignBrick {
     pub planes: Vec<SourcePlane>,
     /// Where materials may meet, by ascending cell.
     pub borders: Vec<Border>,
+    /// Ambiguous faces ([`crate::octree::face_index`]) that a wall passes along, ascending.
+    pub walls: Vec<u32>,
 }
 
 type BrickSerializer<'a> = Strategy<Serializer<AlignedVec, ArenaHandle<'a>, Share>, BoxedError>;
@@ -175,7 +178,11 @@ impl ArchiveSize for HitBrick {
 impl ArchiveSize for SignBrick {
     fn archive_bytes(&self) -> usize {
         let borders = size_of::<ArchivedBorder>() * self.borders.len();
-        8 * self.crossings.len() + 32 * self.planes.len() + borders + ROOT_BYTES
+        8 * self.crossings.len()
+            + 32 * self.planes.len()
+            + borders
+            + 4 * self.walls.len()
+            + ROOT_BYTES
     }
 }
 
@@ -246,7 +253,10 @@ pub fn decode_signs(bytes: &[u8]) -> Result<&ArchivedSignBrick, BrickError> {
         }
     }
     check_borders(kind, &brick.borders)?;
-    Ok(brick)
+    match brick.walls.iter().find(|face| face.to_native() >= OWN_FACES) {
+        Some(face) => Err(out_of_range(kind, "face", face.to_native().into(), OWN_FACES.into())),
+        None => Ok(brick),
+    }
 }
 
 #[cfg(test)]

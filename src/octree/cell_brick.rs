@@ -83,8 +83,8 @@ pub struct Above {
 /// no cluster covers. Vertices are numbered along it.
 #[derive(Clone, Debug, Default, PartialEq, Archive, Serialize, Deserialize)]
 pub struct CellBrick {
-    /// Cell number in Morton order (15 bits), corner mask (8 bits at 15), flags of a flipped face
-    /// (1 bit at 23) and of one vertex for all components (1 bit at 24); ascending.
+    /// Cell number in Morton order (15 bits), corner mask (8 bits at 15), faces that join their
+    /// inside corners (6 bits at 23), flag of one vertex for all components (1 bit at 29); ascending.
     pub cells: Vec<u32>,
     /// Clusters: number of their first cell (15 bits), level 1 to 5 (3 bits at 15), number of
     /// vertices (8 bits at 18); ascending, none within another.
@@ -178,8 +178,8 @@ pub fn decode_cells(bytes: &[u8]) -> Result<&ArchivedCellBrick, BrickError> {
     let kind = "cell";
     let brick = rkyv::access::<ArchivedCellBrick, BoxedError>(bytes)
         .map_err(|source| BrickError::Invalid { kind, source })?;
-    if let Some(cell) = brick.cells.iter().find(|cell| cell.to_native() >> 25 != 0) {
-        return Err(out_of_range(kind, "cell", cell.to_native().into(), 1 << 25));
+    if let Some(cell) = brick.cells.iter().find(|cell| cell.to_native() >> 30 != 0) {
+        return Err(out_of_range(kind, "cell", cell.to_native().into(), 1 << 30));
     }
     let is_reach = |reach: &ArchivedVertexReach| reach.cell.to_native() < 1 << 15 && reach.face < 6;
     if let Some(reach) = brick.reaches.iter().find(|reach| !is_reach(reach)) {

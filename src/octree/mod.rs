@@ -2,6 +2,7 @@
 //!
 //! Nothing here knows where bytes lie; nothing here knows a file format or a stage.
 
+mod ambiguous;
 mod binned;
 mod border;
 mod brick;
@@ -22,6 +23,7 @@ mod soup_edges;
 mod touch;
 mod triangle;
 
+pub use ambiguous::{OWN_FACES, face_index, for_each_ambiguous_face};
 pub use binned::{BinEntry, BinSpools, BinWalk, BinnedSoup, SoupBin, write_bins};
 pub use border::{ArchivedBorder, Border, BorderBrick, decode_borders};
 pub use brick::{

@@ -305,7 +305,7 @@ impl Run<'_> {
         let flooded = Flooded::open(resources, &files)?;
         let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;
         let borders = open_bricks(&mut handles.borders, BORDERS, workspace, resources)?;
-        let rule = self.settings.fill_rule;
+        let rule = (self.settings.fill_rule, findings.domain());
         let (signs, stats) = assign_signs((hits, Some(borders)), &flips, &flooded, rule, resources)
             .map_err(RepairError::Sign)?;
         findings.sign = stats;

@@ -20,6 +20,7 @@ mod parity;
 mod relabel;
 mod thin;
 mod tips;
+mod walls;
 mod winding;
 
 use serde::{Deserialize, Serialize};
@@ -107,6 +108,8 @@ pub struct SignStats {
     pub tip_corners: u64,
     /// Edges with hits whose both ends are inside: surface hidden in the solid.
     pub buried_edges: u64,
+    /// Ambiguous faces that a wall of about a cell passes along.
+    pub walled_faces: u64,
 }
 
 impl SignStats {
@@ -121,6 +124,7 @@ impl SignStats {
         self.thin_edges += other.thin_edges;
         self.tip_corners += other.tip_corners;
         self.buried_edges += other.buried_edges;
+        self.walled_faces += other.walled_faces;
     }
 }
 
@@ -169,10 +173,10 @@ pub fn assign_signs(
     (hits, borders): (&BrickFile, Option<&BrickFile>),
     flips: &Flips,
     flooded: &Flooded,
-    rule: FillRule,
+    (rule, domain): (FillRule, &Domain),
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
-    let (file, stats) = relabel((hits, borders), flips, flooded, rule, resources)?;
+    let (file, stats) = relabel((hits, borders), flips, flooded, (rule, domain), resources)?;
     note_fill(&stats, resources.monitor);
     Ok((file, stats))
 }

@@ -2,13 +2,14 @@
 
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedHitBrick, Border, CornerBits, Crossing, EdgeBits, FlipRecord, Flips, HitEdge, LINES,
-    NO_PLANE, PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_borders, decode_hits,
-    edge_position, encode, find_regions,
+    ArchivedHitBrick, Border, CornerBits, Crossing, Domain, EdgeBits, FlipRecord, Flips, HitEdge,
+    LINES, NO_PLANE, PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_borders,
+    decode_hits, edge_position, encode, find_regions,
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::tips::take_off_tips;
+use crate::sign::walls::find_walls;
 use crate::sign::{FillRule, SIGNS, SignError, SignStats};
 use crate::store::{BrickFile, BrickPass, Resources, ordered_by_weight};
 
@@ -33,7 +34,7 @@ pub fn relabel(
     (hits, borders): (&BrickFile, Option<&BrickFile>),
     flips: &Flips,
     flooded: &Flooded,
-    rule: FillRule,
+    (rule, domain): (FillRule, &Domain),
     resources: &Resources,
 ) -> Result<(BrickFile, SignStats), SignError> {
     let mut pass = BrickPass::<SignStats>::start(SIGNS, resources)?;
@@ -55,7 +56,7 @@ pub fn relabel(
         Workspace::default,
         |space, item| {
             let _brick = resident.hold(1);
-            space.relabel((hits, borders), &item, rule)
+            space.relabel((hits, borders), &item, (rule, domain))
         },
         |done: Relabelled| {
             pass.counts.add(&done.stats);
@@ -84,7 +85,7 @@ impl Workspace {
         &mut self,
         (hits, borders): (&BrickFile, Option<&BrickFile>),
         item: &RelabelItem,
-        rule: FillRule,
+        (rule, domain): (FillRule, &Domain),
     ) -> Result<Relabelled, SignError> {
         let view = self.loaded.load(hits, &item.load)?;
         let record = view.as_ref().map(|view| decode_hits(view)).transpose()?;
@@ -105,6 +106,9 @@ impl Workspace {
             let view = borders.view(number)?;
             brick.borders.extend(decode_borders(&view)?.borders.iter().map(Border::from));
         }
+        let cell_units = f64::from(domain.cell_units);
+        brick.walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
+        stats.walled_faces = brick.walls.len() as u64;
         stats.bricks = u64::from(!brick.crossings.is_empty());
         let bytes = encode(&brick);
         Ok(Relabelled { key: item.load.brick.0, bytes, stats })

@@ -23,7 +23,7 @@ fn assert_sound(found: &Contoured, name: &str) {
 #[test]
 fn the_surface_of_noise_is_closed_and_manifold() {
     for (seed, inside_share, patch_share) in [(1, 0.5, 0.5), (2, 0.2, 0.0), (3, 0.8, 0.1)] {
-        let field = Field { seed, inside_share, patch_share, decimate_cells: 0.0 };
+        let field = Field { seed, inside_share, patch_share, wall_share: 0.0, decimate_cells: 0.0 };
         let found = contour_by(Method::Mc, &field, Backing::Memory, 1);
         assert_sound(&found, &format!("{inside_share} inside, {patch_share} patched"));
         assert!(found.proof.triangles > 10_000);
@@ -32,7 +32,13 @@ fn the_surface_of_noise_is_closed_and_manifold() {
 
 #[test]
 fn noise_in_mapped_bricks_and_on_more_threads_is_the_same() {
-    let field = Field { seed: 6, inside_share: 0.5, patch_share: 0.3, decimate_cells: 0.0 };
+    let field = Field {
+        seed: 6,
+        inside_share: 0.5,
+        patch_share: 0.3,
+        wall_share: 0.0,
+        decimate_cells: 0.0,
+    };
     let one = contour_by(Method::Mc, &field, Backing::Memory, 1);
     assert_sound(&one, "in memory");
     for (backing, threads) in [(Backing::Mapped, 1), (Backing::Mapped, 4), (Backing::Memory, 4)] {

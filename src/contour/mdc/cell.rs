@@ -1,15 +1,14 @@
 //! Cells as they are packed in records, and how their faces join their crossed edges.
 
 use crate::contour::mdc::table::{
-    Components, FLIPPED, JOINED, Segments, TABLE, TWO_SIDED, corner_of_edge, edge_at_corner,
-    is_ambiguous, segments,
+    Components, ONE_VERTEX, Segments, components, corner_of_edge, edge_at_corner, segments,
 };
 
-/// Flag of a cell whose two-sided face is flipped, beside its number and mask.
-pub const FLIPPED_BIT: u32 = 1 << 23;
+/// Where the six bits of a cell's joined faces begin, above its number and mask.
+pub const JOINED_FACES: u32 = 23;
 
-/// Flag of a cell whose components share one vertex, beside its number and mask.
-pub const JOINED_BIT: u32 = 1 << 24;
+/// Flag of a cell whose components share one vertex, above its joined faces.
+pub const ONE_VERTEX_BIT: u32 = 1 << 29;
 
 /// Morton bits of a coordinate below 32.
 const SPREAD: [u16; 32] = {
@@ -26,12 +25,16 @@ const SPREAD: [u16; 32] = {
 /// The components of a packed cell.
 #[inline]
 pub fn components_of(cell: u32) -> &'static Components {
-    let mask = (cell >> 15 & 0xff) as usize;
-    match cell & (FLIPPED_BIT | JOINED_BIT) {
-        0 => &TABLE[mask],
-        FLIPPED_BIT => &FLIPPED[mask],
-        _ => &JOINED[mask],
+    if cell & ONE_VERTEX_BIT != 0 {
+        return &ONE_VERTEX[usize::from(cell_mask(cell))];
     }
+    components(cell_mask(cell), joined_faces(cell))
+}
+
+/// The faces of a packed cell that join their inside corners, as bits.
+#[inline]
+pub const fn joined_faces(cell: u32) -> u8 {
+    (cell >> JOINED_FACES & 0x3f) as u8
 }
 
 /// The number of a packed cell in its brick, in Morton order.
@@ -81,22 +84,7 @@ pub static OWN_EDGES: [u8; 256] = {
     counts
 };
 
-/// Which faces of every corner mask have all four edges crossed, as bits.
-pub static AMBIGUOUS_FACES: [u8; 256] = {
-    let mut faces = [0; 256];
-    let mut mask = 0;
-    while mask < 256 {
-        let mut face = 0;
-        while face < 6 {
-            faces[mask] |= (is_ambiguous(mask as u8, face) as u8) << face;
-            face += 1;
-        }
-        mask += 1;
-    }
-    faces
-};
-
-/// Of every mask and face, without and with the flip of its two-sided face.
+/// Of every mask and face, where it does not join its inside corners and where it does.
 static SEGMENTS: [[[Segments; 6]; 256]; 2] = {
     let none = Segments::NONE;
     let mut all = [[[none; 6]; 256]; 2];
@@ -104,9 +92,8 @@ static SEGMENTS: [[[Segments; 6]; 256]; 2] = {
     while mask < 256 {
         let mut face = 0;
         while face < 6 {
-            let flips = TWO_SIDED[mask] == face as u8;
             all[0][mask][face] = segments(mask as u8, face as u8, false);
-            all[1][mask][face] = segments(mask as u8, face as u8, flips);
+            all[1][mask][face] = segments(mask as u8, face as u8, true);
             face += 1;
         }
         mask += 1;
@@ -117,7 +104,8 @@ static SEGMENTS: [[[Segments; 6]; 256]; 2] = {
 /// How `face` of a packed cell joins its crossed edges.
 #[inline]
 pub fn segments_on(cell: u32, face: usize) -> &'static Segments {
-    &SEGMENTS[usize::from(cell & FLIPPED_BIT != 0)][usize::from(cell_mask(cell))][face]
+    let joins = usize::from(joined_faces(cell) >> face & 1);
+    &SEGMENTS[joins][usize::from(cell_mask(cell))][face]
 }
 
 /// The lower end of `edge` of the cell at `at`.
@@ -143,7 +131,7 @@ pub fn edges_of_mask(edges: u16) -> impl Iterator<Item = u8> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::contour::mdc::table::{components, is_marked};
+    use crate::contour::mdc::table::{AMBIGUOUS_FACES, is_marked};
 
     #[test]
     fn numbers_and_places_are_each_others_inverse() {
@@ -155,10 +143,10 @@ mod tests {
     #[test]
     fn segments_join_the_edges_of_one_component_and_every_marked_edge_twice() {
         for mask in 0..=255_u8 {
-            for flipped in [false, true] {
-                let cell = u32::from(mask) << 15 | if flipped { FLIPPED_BIT } else { 0 };
-                let face = if flipped { TWO_SIDED[usize::from(mask)] } else { 255 };
-                let expected = components(mask, face);
+            let ambiguous = AMBIGUOUS_FACES[usize::from(mask)];
+            for joined in (0..64).filter(|joined| joined & !ambiguous == 0) {
+                let cell = u32::from(mask) << 15 | u32::from(joined) << JOINED_FACES;
+                let expected = components_of(cell);
                 let mut seen = [0; 12];
                 for face in 0..6 {
                     for &[a, b] in segments_on(cell, face).pairs() {

@@ -22,6 +22,7 @@ mod face_points;
 mod far_points;
 mod features;
 mod grants;
+mod joined_faces;
 mod layers;
 mod leaf_vertex;
 mod leaves;
@@ -34,7 +35,6 @@ mod reach;
 mod separate;
 mod shape;
 mod triangulate;
-mod two_sided;
 mod vertices;
 
 pub use layers::Layers;

@@ -1,12 +1,13 @@
 //! The leaf table: which crossed edges of a cell share one vertex, for all 256 sign patterns.
 //!
-//! In:         the signs of a cell's eight corners as a mask, and at most one flipped face.
+//! In:         the signs of a cell's eight corners as a mask, and those ambiguous faces that join
+//!             their inside corners.
 //! Out:        [`Components`]: the boundary cycles of the surface patch inside the cell.
 //! Invariant:  every marked edge belongs to exactly one component. Each marked edge lies on two
-//!             faces and each face pairs its marked edges, so components are cycles. With
-//!             [`FLIPPED`] used where both cells at a face are two-sided, no edge of the dual
-//!             surface has more than two polygons.
-//! Memory:     two tables of 256 entries, worked out by the compiler, never typed.
+//!             faces and each face pairs its marked edges, so components are cycles. No edge of
+//!             the dual surface has more than two polygons where no face is touched twice
+//!             ([`touches_twice`]) from both of its sides.
+//! Memory:     912 entries, worked out by the compiler, never typed.
 //! Fails:      never.
 //! Source:     Nielson 2004 (Dual Marching Cubes); Wenger 2013 (Isosurfaces), manifold variant.
 //!
@@ -17,9 +18,6 @@
 
 /// Stands for "no component" in [`Components::component_of_edge`].
 pub const NO_COMPONENT: u8 = 255;
-
-/// Stands for "no face" in [`TWO_SIDED`] and as an argument of [`components`].
-pub const NO_FACE: u8 = 255;
 
 /// The boundary cycles of one cell, numbered by their smallest edge.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -32,18 +30,40 @@ pub struct Components {
     pub edge_masks: [u16; 4],
 }
 
-/// The cycles of every mask, "separate inside" on all ambiguous faces.
-pub static TABLE: [Components; 256] = tabulate(false);
+/// The ambiguous faces of every mask, as bits.
+pub static AMBIGUOUS_FACES: [u8; 256] = {
+    let mut faces = [0; 256];
+    let mut mask = 0;
+    while mask < 256 {
+        faces[mask] = ambiguous_faces(mask as u8);
+        mask += 1;
+    }
+    faces
+};
 
-/// The ambiguous face that one cycle of the mask touches twice, else [`NO_FACE`].
-pub static TWO_SIDED: [u8; 256] = tabulate_two_sided();
+/// How many sets of ambiguous faces all masks have together.
+const FACE_SETS: usize = 656;
 
-/// The cycles of every mask with its two-sided face, if any, turned to "separate outside".
-pub static FLIPPED: [Components; 256] = tabulate(true);
+/// The cycles of every mask, no ambiguous face joining its inside corners.
+pub static TABLE: [Components; 256] = tabulate();
+
+/// The cycles of every mask and every set of its ambiguous faces, from [`FIRST_SET`] of the mask on.
+static JOINING: [Components; FACE_SETS] = tabulate_face_sets();
+
+/// The first entry of every mask in [`JOINING`].
+static FIRST_SET: [u16; 256] = {
+    let (mut first, mut sum, mut mask) = ([0; 256], 0, 0);
+    while mask < 256 {
+        first[mask] = sum;
+        sum += 1 << ambiguous_faces(mask as u8).count_ones();
+        mask += 1;
+    }
+    first
+};
 
 /// All crossed edges of every mask as one: one vertex a cell, as in plain dual contouring.
-pub static JOINED: [Components; 256] = {
-    let mut table = tabulate(false);
+pub static ONE_VERTEX: [Components; 256] = {
+    let mut table = tabulate();
     let mut mask = 1;
     while mask < 255 {
         let mut edge = 0;
@@ -129,12 +149,46 @@ pub const fn is_ambiguous(mask: u8, face: u8) -> bool {
         && mask >> corners[2] & 1 != sign
 }
 
+const fn ambiguous_faces(mask: u8) -> u8 {
+    let (mut faces, mut face) = (0, 0);
+    while face < 6 {
+        faces |= (is_ambiguous(mask, face) as u8) << face;
+        face += 1;
+    }
+    faces
+}
+
+/// The cycles of `mask` where those of its ambiguous faces are joined that are set in `joined`.
+#[must_use]
+#[inline]
+pub fn components(mask: u8, joined: u8) -> &'static Components {
+    if joined == 0 {
+        return &TABLE[usize::from(mask)];
+    }
+    // The rank of the set: its bits moved together.
+    let (mut faces, mut rank, mut bit) = (AMBIGUOUS_FACES[usize::from(mask)], 0, 0);
+    while faces != 0 {
+        rank |= usize::from(joined >> faces.trailing_zeros() & 1) << bit;
+        faces &= faces - 1;
+        bit += 1;
+    }
+    &JOINING[usize::from(FIRST_SET[usize::from(mask)]) + rank]
+}
+
+/// Whether `face` is ambiguous and one cycle has all its four edges.
+#[must_use]
+pub fn touches_twice(mask: u8, joined: u8, face: usize) -> bool {
+    // Opposite edges of an ambiguous face are never joined on the face itself.
+    let [one, opposite, ..] = edges_of_face(face as u8).map(usize::from);
+    let cycle_of = &components(mask, joined).component_of_edge;
+    AMBIGUOUS_FACES[usize::from(mask)] >> face & 1 == 1 && cycle_of[one] == cycle_of[opposite]
+}
+
 /// Works out the cycles of `mask`.
 ///
 /// A face with two marked edges joins them; an ambiguous face joins the two edges around each of
-/// its inside corners, or around each outside corner when it is `flipped_face`.
-#[must_use]
-pub const fn components(mask: u8, flipped_face: u8) -> Components {
+/// its inside corners, or around each outside corner when it is one of those in `joined`.
+const fn work_out(mask: u8, joined: u8) -> Components {
     let mut label = [0_u8; 12];
     let mut edge = 0;
     while edge < 12 {
@@ -143,7 +197,7 @@ pub const fn components(mask: u8, flipped_face: u8) -> Components {
     }
     let mut face = 0;
     while face < 6 {
-        label = join_on_face(label, mask, face, face == flipped_face);
+        label = join_on_face(label, mask, face, joined >> face & 1 == 1);
         face += 1;
     }
     number(label)
@@ -168,9 +222,9 @@ impl Segments {
 }
 
 /// How `face` joins the crossed edges of `mask`: the two that there are, or on an ambiguous face the
-/// two around each inside corner, around each outside corner when it is `flipped`.
+/// two around each inside corner, around each outside corner when it `joins` the inside ones.
 #[must_use]
-pub const fn segments(mask: u8, face: u8, flipped: bool) -> Segments {
+pub const fn segments(mask: u8, face: u8, joins: bool) -> Segments {
     let mut out = Segments::NONE;
     if is_ambiguous(mask, face) {
         let (first, second) = other_axes(face / 2);
@@ -178,7 +232,7 @@ pub const fn segments(mask: u8, face: u8, flipped: bool) -> Segments {
         let mut i = 0;
         while i < 4 {
             let inside = mask >> corners[i] & 1 == 1;
-            if inside != flipped {
+            if inside != joins {
                 out.pairs[out.count as usize] =
                     [edge_at_corner(corners[i], first), edge_at_corner(corners[i], second)];
                 out.count += 1;
@@ -202,8 +256,8 @@ pub const fn segments(mask: u8, face: u8, flipped: bool) -> Segments {
 }
 
 /// Joins the labels of those edges that `face` connects.
-const fn join_on_face(mut label: [u8; 12], mask: u8, face: u8, flipped: bool) -> [u8; 12] {
-    let segments = segments(mask, face, flipped);
+const fn join_on_face(mut label: [u8; 12], mask: u8, face: u8, joins: bool) -> [u8; 12] {
+    let segments = segments(mask, face, joins);
     let mut i = 0;
     while i < segments.count as usize {
         label = join(label, segments.pairs[i][0], segments.pairs[i][1]);
@@ -247,43 +301,35 @@ const fn number(label: [u8; 12]) -> Components {
     out
 }
 
-/// The first ambiguous face whose four edges are in one cycle.
-const fn two_sided_face(mask: u8, components: &Components) -> u8 {
-    let mut face = 0;
-    while face < 6 {
-        let edges = edges_of_face(face);
-        // Opposite edges of an ambiguous face are never joined on the face itself.
-        if is_ambiguous(mask, face)
-            && components.component_of_edge[edges[0] as usize]
-                == components.component_of_edge[edges[1] as usize]
-        {
-            return face;
-        }
-        face += 1;
-    }
-    NO_FACE
-}
-
-const fn tabulate(flipped: bool) -> [Components; 256] {
-    let mut table = [components(0, NO_FACE); 256];
+const fn tabulate() -> [Components; 256] {
+    let mut table = [work_out(0, 0); 256];
     let mut mask = 0;
     while mask < 256 {
-        let plain = components(mask as u8, NO_FACE);
-        let face = two_sided_face(mask as u8, &plain);
-        table[mask] = if flipped { components(mask as u8, face) } else { plain };
+        table[mask] = work_out(mask as u8, 0);
         mask += 1;
     }
     table
 }
 
-const fn tabulate_two_sided() -> [u8; 256] {
-    let mut faces = [NO_FACE; 256];
-    let mut mask = 0;
+const fn tabulate_face_sets() -> [Components; FACE_SETS] {
+    let mut table = [work_out(0, 0); FACE_SETS];
+    let (mut entry, mut mask) = (0, 0);
     while mask < 256 {
-        faces[mask] = two_sided_face(mask as u8, &components(mask as u8, NO_FACE));
+        let ambiguous = ambiguous_faces(mask as u8);
+        // All subsets in the order of their ranks.
+        let mut joined = 0;
+        loop {
+            table[entry] = work_out(mask as u8, joined);
+            entry += 1;
+            joined = (joined | !ambiguous).wrapping_add(1) & ambiguous;
+            if joined == 0 {
+                break;
+            }
+        }
         mask += 1;
     }
-    faces
+    assert!(entry == FACE_SETS);
+    table
 }
 
 #[cfg(test)]

@@ -9,9 +9,10 @@ use std::collections::HashMap;
 
 use glam::DVec3;
 
-use crate::contour::mdc::cell::{FLIPPED_BIT, JOINED_BIT, components_of, number_at, place_of};
+use crate::contour::mdc::cell::{JOINED_FACES, ONE_VERTEX_BIT, components_of, number_at, place_of};
 use crate::contour::mdc::cluster::{ClusterOptions, Clustering, Leaves};
 use crate::contour::mdc::features::{Halo, Place};
+use crate::contour::mdc::joined_faces::Beyond;
 use crate::contour::mdc::leaf_vertex::WaitingCells;
 use crate::contour::mdc::patch_surfaces::PatchSurfaces;
 use crate::contour::mdc::{INSET_UNITS, flags_of};
@@ -122,7 +123,7 @@ pub struct Workspace {
     pub(super) method: Method,
     touched: Touched,
     marks: EdgeBits,
-    signs: CornerBits,
+    pub(super) signs: CornerBits,
     /// First crossing of each row of edges.
     row_starts: Vec<u32>,
     crossings: Vec<EdgeCrossing>,
@@ -142,8 +143,10 @@ pub struct Workspace {
     /// Whether no two planes of the brick differ by more than the crease angle.
     pub(super) is_smooth: bool,
     pub(super) halo: Halo,
-    /// Corner signs of bricks beyond a side, for faces that two bricks must agree on.
-    pub(super) beyond: HashMap<u64, CornerBits>,
+    /// Walled faces of the brick.
+    pub(super) walls: Vec<u32>,
+    /// Bricks beyond a side, for faces that two bricks must agree on.
+    pub(super) beyond: HashMap<u64, Beyond>,
 }
 
 /// How the vertices of cells and of clusters are placed.
@@ -185,6 +188,7 @@ impl Workspace {
             crease_cosine: (1.0 - qef.cutoff()) / (1.0 + qef.cutoff()),
             is_smooth: false,
             halo: Halo::new(),
+            walls: Vec::new(),
             beyond: HashMap::new(),
         }
     }
@@ -246,6 +250,8 @@ impl Workspace {
         let mut has_patches = false;
         let cell_units = self.cell_units as f64;
         self.planes.clear();
+        self.walls.clear();
+        self.walls.extend(record.walls.iter().map(|face| face.to_native()));
         self.borders.clear();
         self.borders.extend(record.borders.iter().map(Border::from));
         self.planes.extend(record.planes.iter().map(SourcePlane::from));
@@ -325,10 +331,11 @@ impl Workspace {
         let mask = self.signs.cell_mask(at);
         let mut cell = number as u32 | u32::from(mask) << 15;
         if self.method == Method::Dc {
-            cell |= JOINED_BIT;
-        } else if self.is_flipped(signs, key, at, mask)? {
-            cell |= FLIPPED_BIT;
-            stats.flipped_faces += 1;
+            cell |= ONE_VERTEX_BIT;
+        } else {
+            let (joined, turned) = self.joined_faces(signs, key, at, mask)?;
+            cell |= u32::from(joined) << JOINED_FACES;
+            stats.flipped_faces += u64::from(turned);
         }
         let components = components_of(cell);
         let masks = &components.edge_masks[..usize::from(components.count)];

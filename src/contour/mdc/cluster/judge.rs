@@ -4,12 +4,13 @@
 
 use glam::DVec3;
 
-use crate::contour::mdc::cell::{AMBIGUOUS_FACES, cell_mask, cell_number, place_of, segments_on};
+use crate::contour::mdc::cell::{cell_mask, cell_number, place_of, segments_on};
 use crate::contour::mdc::cluster::cut::{Cut, Mark};
 use crate::contour::mdc::cluster::node::Node;
 use crate::contour::mdc::cluster::planes::{largest_distance, place};
 use crate::contour::mdc::cluster::{Cell, ClusterOptions, Clustering};
 use crate::contour::mdc::reach::SHARP_CELLS;
+use crate::contour::mdc::table::AMBIGUOUS_FACES;
 
 /// What comes of the vertex of a piece.
 enum Placed {

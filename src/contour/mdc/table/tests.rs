@@ -3,20 +3,21 @@
 use super::*;
 use std::collections::HashMap;
 
-fn ambiguous_faces(mask: u8) -> Vec<u8> {
-    (0..6).filter(|&face| is_ambiguous(mask, face)).collect()
+use crate::mesh::shapes::Random;
+
+/// The sets of ambiguous faces of a mask.
+fn face_sets(mask: u8) -> impl Iterator<Item = u8> {
+    (0..64).filter(move |joined| joined & !AMBIGUOUS_FACES[usize::from(mask)] == 0)
 }
 
-/// The faces that one cycle of `components` touches with all four edges.
-fn faces_touched_twice(mask: u8, components: &Components) -> Vec<u8> {
-    let masks = &components.edge_masks[..usize::from(components.count)];
-    ambiguous_faces(mask)
-        .into_iter()
-        .filter(|&face| {
-            let all = edges_of_face(face).iter().fold(0_u16, |bits, &edge| bits | 1 << edge);
-            masks.iter().any(|cycle| cycle & all == all)
-        })
-        .collect()
+/// Every mask with every set of its ambiguous faces.
+fn all_entries() -> impl Iterator<Item = (u8, u8)> {
+    (0..=255).flat_map(|mask| face_sets(mask).map(move |joined| (mask, joined)))
+}
+
+/// The faces that one cycle touches twice.
+fn touched_twice(mask: u8, joined: u8) -> Vec<usize> {
+    (0..6).filter(|face| touches_twice(mask, joined, *face)).collect()
 }
 
 #[test]
@@ -55,71 +56,74 @@ fn component_counts_have_the_known_histogram() {
 
 #[test]
 fn every_marked_edge_is_in_exactly_one_component() {
-    for table in [&TABLE, &FLIPPED] {
-        for (mask, entry) in table.iter().enumerate() {
-            let mut seen = 0_u16;
-            for component in 0..4_u8 {
-                let edges = entry.edge_masks[usize::from(component)];
-                assert_eq!(edges != 0, component < entry.count);
-                assert_eq!(edges & seen, 0);
-                seen |= edges;
-                for edge in 0..12_u8 {
-                    let named = entry.component_of_edge[usize::from(edge)] == component;
-                    assert_eq!(named, edges >> edge & 1 == 1, "mask {mask}");
-                }
-                assert!(edges == 0 || edges.count_ones() >= 3);
-            }
+    assert_eq!(all_entries().count(), FACE_SETS);
+    for (mask, joined) in all_entries() {
+        let entry = components(mask, joined);
+        let mut seen = 0_u16;
+        for component in 0..4_u8 {
+            let edges = entry.edge_masks[usize::from(component)];
+            assert_eq!(edges != 0, component < entry.count);
+            assert_eq!(edges & seen, 0);
+            seen |= edges;
             for edge in 0..12_u8 {
-                assert_eq!(is_marked(mask as u8, edge), seen >> edge & 1 == 1);
+                let named = entry.component_of_edge[usize::from(edge)] == component;
+                assert_eq!(named, edges >> edge & 1 == 1, "mask {mask}");
             }
+            assert!(edges == 0 || edges.count_ones() >= 3);
+        }
+        for edge in 0..12_u8 {
+            assert_eq!(is_marked(mask, edge), seen >> edge & 1 == 1);
         }
     }
 }
 
 #[test]
-fn thirty_six_masks_are_two_sided_at_their_only_ambiguous_face() {
-    let mut two_sided = 0;
+fn entries_are_those_that_are_worked_out() {
+    for (mask, joined) in all_entries() {
+        assert_eq!(components(mask, joined), &work_out(mask, joined), "{mask} {joined}");
+    }
+}
+
+#[test]
+fn thirty_six_masks_touch_their_only_ambiguous_face_twice_where_nothing_is_joined() {
+    let mut touching = 0;
     for mask in 0..=255_u8 {
-        let faces = faces_touched_twice(mask, &TABLE[usize::from(mask)]);
-        if faces.is_empty() {
-            assert_eq!(TWO_SIDED[usize::from(mask)], NO_FACE);
-            assert_eq!(FLIPPED[usize::from(mask)], TABLE[usize::from(mask)]);
-        } else {
-            assert_eq!(faces, ambiguous_faces(mask));
-            assert_eq!(faces, [TWO_SIDED[usize::from(mask)]]);
-            two_sided += 1;
+        let faces = touched_twice(mask, 0);
+        if !faces.is_empty() {
+            assert_eq!(faces.iter().fold(0, |b, f| b | 1 << f), AMBIGUOUS_FACES[usize::from(mask)]);
+            assert_eq!(faces.len(), 1);
+            touching += 1;
         }
     }
-    assert_eq!(two_sided, 36);
+    assert_eq!(touching, 36);
 }
 
 #[test]
-fn the_flip_splits_the_touching_patch_in_two() {
-    for mask in (0..=255_u8).filter(|&mask| TWO_SIDED[usize::from(mask)] != NO_FACE) {
-        let (plain, flipped) = (&TABLE[usize::from(mask)], &FLIPPED[usize::from(mask)]);
-        assert_eq!(flipped.count, plain.count + 1, "mask {mask}");
-        assert!(faces_touched_twice(mask, flipped).is_empty(), "mask {mask}");
-        let edges = edges_of_face(TWO_SIDED[usize::from(mask)]).map(usize::from);
-        let touching = plain.component_of_edge[edges[0]];
-        for component in 0..plain.count {
-            let cycle = plain.edge_masks[usize::from(component)];
-            assert_eq!(flipped.edge_masks.contains(&cycle), component != touching);
+fn a_turned_face_splits_the_component_that_touches_it_twice_and_no_other() {
+    for (mask, joined) in all_entries() {
+        let before = components(mask, joined);
+        for face in touched_twice(mask, joined) {
+            let after = components(mask, joined ^ 1 << face);
+            assert_eq!(after.count, before.count + 1, "mask {mask}");
+            let edges = edges_of_face(face as u8).map(usize::from);
+            let touching = before.component_of_edge[edges[0]];
+            for component in 0..before.count {
+                let cycle = before.edge_masks[usize::from(component)];
+                assert_eq!(after.edge_masks.contains(&cycle), component != touching);
+            }
+            // So no face is touched twice that was not before, and this one is no more.
+            let still = touched_twice(mask, joined ^ 1 << face);
+            assert!(!still.contains(&face));
+            assert!(still.iter().all(|face| touched_twice(mask, joined).contains(face)));
         }
     }
 }
 
 #[test]
-fn complement_changes_only_ambiguous_faces_and_equals_the_flip_there() {
+fn complement_joins_all_ambiguous_faces() {
     for mask in 0..=255_u8 {
-        let complement = &TABLE[usize::from(!mask)];
-        match ambiguous_faces(mask)[..] {
-            [] => assert_eq!(&TABLE[usize::from(mask)], complement),
-            [face] => assert_eq!(&components(mask, face), complement),
-            _ => {}
-        }
-        if TWO_SIDED[usize::from(mask)] != NO_FACE {
-            assert_eq!(&FLIPPED[usize::from(mask)], complement);
-        }
+        let complement = components(!mask, 0);
+        assert_eq!(components(mask, AMBIGUOUS_FACES[usize::from(mask)]), complement);
     }
 }
 
@@ -141,38 +145,88 @@ fn the_table_turns_with_the_cell() {
                 })
                 .expect("symmetries map edges to edges")
         };
-        for table in [&TABLE, &FLIPPED] {
+        let image_of_face = |face: u8| {
+            let corners = corners_of_face(face).map(|corner| moved(corner));
+            let is_there = |f: &u8| corners.iter().all(|c| corners_of_face(*f).contains(c));
+            (0..6_u8).find(is_there).expect("symmetries map faces to faces")
+        };
+        for joined in face_sets(mask) {
+            let faces = (0..6).filter(|f| joined >> f & 1 == 1);
+            let image_joined = faces.fold(0_u8, |bits, f| bits | 1 << image_of_face(f));
             let sorted = |mut masks: [u16; 4]| {
                 masks.sort_unstable();
                 masks
             };
-            let turned = table[usize::from(mask)].edge_masks.map(|cycle| {
+            let turned = components(mask, joined).edge_masks.map(|cycle| {
                 (0..12).filter(|e| cycle >> e & 1 == 1).fold(0, |b, e| b | 1 << image_of_edge(e))
             });
-            assert_eq!(sorted(turned), sorted(table[usize::from(image)].edge_masks));
+            assert_eq!(sorted(turned), sorted(components(image, image_joined).edge_masks));
         }
     }
 }
 
-/// Random signs on a cube of corners whose outermost layer is outside.
+/// Random signs on a cube of corners whose outermost layer is outside, and random walled faces.
 struct Noise {
     cells: usize,
     inside: Vec<bool>,
+    /// Of every cell, which faces join their inside corners.
+    joined: Vec<u8>,
 }
 
 impl Noise {
-    fn new(cells: usize, seed: u64) -> Self {
+    /// One face in `walls_below` hundred is walled; faces are turned where `turns`.
+    fn new(cells: usize, seed: u64, walls_below: usize, turns: bool) -> Self {
         let corners = cells + 1;
-        let mut state = seed;
+        let mut random = Random::new(seed);
         let mut inside = vec![false; corners * corners * corners];
         for (i, sign) in inside.iter_mut().enumerate() {
-            state = state
-                .wrapping_mul(6_364_136_223_846_793_005)
-                .wrapping_add(1_442_695_040_888_963_407);
             let at = [i % corners, i / corners % corners, i / corners / corners];
-            *sign = state >> 63 == 1 && at.iter().all(|&x| x > 0 && x < cells);
+            *sign = random.below(2) == 1 && at.iter().all(|&x| x > 0 && x < cells);
         }
-        Self { cells, inside }
+        let joined = vec![0; cells * cells * cells];
+        let mut noise = Self { cells, inside, joined };
+        // The outermost faces carry no marks.
+        noise.each_pair(|noise, (cell, mask), (beyond, other), face| {
+            let is_walled = random.below(100) < walls_below;
+            let checkered = [mask, other].iter().any(|m| AMBIGUOUS_FACES[usize::from(*m)] == 63);
+            if is_walled && !checkered {
+                noise.joined[cell] |= 1 << face;
+                noise.joined[beyond] |= 1 << (face ^ 1);
+            }
+        });
+        // One face after the other: the rounds of the grid must do as well as any order.
+        if turns {
+            noise.each_pair(|noise, (cell, mask), (beyond, other), face| {
+                if touches_twice(mask, noise.joined[cell], face)
+                    && touches_twice(other, noise.joined[beyond], face ^ 1)
+                {
+                    noise.joined[cell] ^= 1 << face;
+                    noise.joined[beyond] ^= 1 << (face ^ 1);
+                }
+            });
+        }
+        noise
+    }
+
+    /// Visits every ambiguous face between two cells: their numbers and masks, and the face of the
+    /// first.
+    fn each_pair(&mut self, mut visit: impl FnMut(&mut Self, (usize, u8), (usize, u8), usize)) {
+        let n = self.cells;
+        for (i, axis) in (0..n * n * n).flat_map(|i| (0..3).map(move |axis| (i, axis))) {
+            let cell = [i % n, i / n % n, i / n / n];
+            let mut beyond = cell;
+            beyond[axis] += 1;
+            let face = 2 * axis + 1;
+            let mask = self.mask(cell);
+            if beyond[axis] < n && AMBIGUOUS_FACES[usize::from(mask)] >> face & 1 == 1 {
+                let other = self.mask(beyond);
+                visit(self, (i, mask), (self.number(beyond), other), face);
+            }
+        }
+    }
+
+    fn number(&self, cell: [usize; 3]) -> usize {
+        (cell[2] * self.cells + cell[1]) * self.cells + cell[0]
     }
 
     fn sign(&self, at: [usize; 3]) -> bool {
@@ -185,24 +239,8 @@ impl Noise {
         (0..8).filter(|&i| self.sign(corner(i))).fold(0, |mask, i| mask | 1 << i)
     }
 
-    /// The entry of a cell, flipped where the cell and its neighbour are two-sided at one face.
-    fn entry(&self, cell: [usize; 3], flips: bool) -> &'static Components {
-        let mask = usize::from(self.mask(cell));
-        let face = TWO_SIDED[mask];
-        if flips && face != NO_FACE {
-            let mut neighbour = cell;
-            let axis = usize::from(face / 2);
-            // The outermost faces carry no marks, so the neighbour exists.
-            neighbour[axis] = neighbour[axis] + 2 * usize::from(face & 1) - 1;
-            if TWO_SIDED[usize::from(self.mask(neighbour))] == face ^ 1 {
-                return &FLIPPED[mask];
-            }
-        }
-        &TABLE[mask]
-    }
-
     /// One quad per marked edge; a vertex is a cell number times four plus a component.
-    fn quads(&self, flips: bool) -> Vec<[usize; 4]> {
+    fn quads(&self) -> Vec<[usize; 4]> {
         let n = self.cells;
         let mut quads = Vec::new();
         for (axis, i) in (0..3).flat_map(|axis| (0..n * n * n).map(move |i| (axis, i))) {
@@ -218,9 +256,11 @@ impl Noise {
                 cell[usize::from(u)] -= first;
                 cell[usize::from(v)] -= second;
                 let edge = axis * 4 + (second << 1 | first);
-                let component = self.entry(cell, flips).component_of_edge[edge];
+                let number = self.number(cell);
+                let entry = components(self.mask(cell), self.joined[number]);
+                let component = entry.component_of_edge[edge];
                 assert_ne!(component, NO_COMPONENT);
-                ((cell[2] * n + cell[1]) * n + cell[0]) * 4 + usize::from(component)
+                number * 4 + usize::from(component)
             }));
         }
         quads
@@ -261,13 +301,12 @@ fn is_one_cycle(link: &[[usize; 2]]) -> bool {
 }
 
 #[test]
-fn noise_becomes_manifold_by_the_flips_and_only_by_them() {
-    for seed in [1, 2] {
-        let noise = Noise::new(40, seed);
-        let quads = noise.quads(true);
+fn noise_becomes_manifold_by_turned_faces_and_only_by_them() {
+    for (seed, walls_below) in [(1, 0), (2, 10), (3, 50), (4, 100)] {
+        let quads = Noise::new(40, seed, walls_below, true).quads();
         assert!(quads.len() > 50_000);
-        assert_eq!(non_manifold(&quads), (0, 0));
-        let (edges, _) = non_manifold(&noise.quads(false));
+        assert_eq!(non_manifold(&quads), (0, 0), "{walls_below} of 100 walled");
+        let (edges, _) = non_manifold(&Noise::new(40, seed, walls_below, false).quads());
         assert!(edges > 0, "the test must be able to fail");
     }
 }
