@@ -3,7 +3,7 @@
 //! In:         the hits that were lost, by triangle; the bins of the soup.
 //! Out:        [`Losses`].
 //! Units:      hits count edges of the grid.
-//! Memory:     4 bytes a triangle, in a table that spills; numbers of bricks and of a brick's pieces.
+//! Memory:     8 bytes a triangle, in a table that spills; numbers of bricks and of a brick's pieces.
 //! Fails:      [`StoreError`].
 //! Source:     ours.
 
@@ -21,6 +21,9 @@ use crate::store::{Resources, Sorted, Sorter, StoreError, Table};
 /// Share of its hits that a wall loses when it is thin: of a plate that is t cells thick 1 - t.
 const LOST_SHARE: f64 = 0.15;
 
+/// The same of hits away from any rim, each of which is a hole in the wall.
+const LOST_INNER_SHARE: f64 = 0.01;
+
 /// Share of its hits that a large triangle of a torn piece has to lose to be taken for a part of it.
 const BRINK_SHARE: f64 = 0.03;
 
@@ -35,12 +38,14 @@ const LEAST_HITS: f64 = 8.0;
 pub(crate) struct Hits {
     expected: f64,
     pub(crate) lost: f64,
+    inner: f64,
 }
 
 impl Hits {
     fn add(&mut self, other: Self) {
         self.expected += other.expected;
         self.lost += other.lost;
+        self.inner += other.inner;
     }
 
     /// Whether a triangle of this piece is torn. A large one tells for itself, unless it is on the
@@ -53,6 +58,13 @@ impl Hits {
 
     pub(crate) fn are_torn(self) -> bool {
         self.lost >= LEAST_LOST && self.lost >= LOST_SHARE * self.expected
+            || self.inner >= LEAST_LOST && self.inner >= LOST_INNER_SHARE * self.expected
+    }
+
+    /// Whether a piece that this is a part of may be torn.
+    fn may_be_of_torn(self) -> bool {
+        self.lost >= LOST_SHARE * self.expected
+            || self.inner > 0.0 && self.inner >= LOST_INNER_SHARE * self.expected
     }
 }
 
@@ -65,7 +77,8 @@ fn expected_hits(triangle: &SoupTriangle, domain: &Domain) -> f64 {
 
 /// The lost hits of every triangle.
 pub(crate) struct Losses<'d> {
-    counts: Table<u32>,
+    /// All lost hits of each, and the inner ones.
+    counts: Table<[u32; 2]>,
     domain: &'d Domain,
     given: u64,
     triangles: u64,
@@ -79,20 +92,21 @@ impl<'d> Losses<'d> {
         (given, triangles): (u64, u64),
         resources: &Resources,
     ) -> Result<Self, StoreError> {
-        let mut counts = Table::new(resources.scratch, resources.share_bytes / 8);
+        let mut all = Table::new(resources.scratch, resources.share_bytes / 8);
         let mut sorted: Sorted<LostHits> = lost.finish()?;
         let mut next = sorted.next()?;
         for source in 0..triangles {
-            let mut count = 0;
+            let mut counts = [0, 0];
             while let Some(lost) = next
                 && u64::from(lost.source) == source
             {
-                count += lost.count;
+                counts[0] += lost.count;
+                counts[1] += lost.inner;
                 next = sorted.next()?;
             }
-            counts.push(count)?;
+            all.push(counts)?;
         }
-        Ok(Self { counts, domain, given, triangles })
+        Ok(Self { counts: all, domain, given, triangles })
     }
 
     /// Whether a triangle is judged in this brick. Walls and fills are as thick as they should be.
@@ -102,8 +116,8 @@ impl<'d> Losses<'d> {
 
     /// The hits of a triangle.
     pub(crate) fn hits_of(&mut self, triangle: &SoupTriangle) -> Result<Hits, StoreError> {
-        let lost = f64::from(self.counts.get(triangle.source.into())?);
-        Ok(Hits { expected: expected_hits(triangle, self.domain), lost })
+        let [lost, inner] = self.counts.get(triangle.source.into())?.map(f64::from);
+        Ok(Hits { expected: expected_hits(triangle, self.domain), lost, inner })
     }
 
     /// Those of the sheets in a brick that lost some, by the first triangle of the sheet.
@@ -147,7 +161,7 @@ impl<'d> Losses<'d> {
                 continue;
             }
             let pieces = self.pieces_of(&bin, soup, &mut sheets)?;
-            if pieces.values().any(|hits| hits.lost >= LOST_SHARE * hits.expected) {
+            if pieces.values().any(|hits| hits.may_be_of_torn()) {
                 return Ok(true);
             }
             let mut is_torn = false;
@@ -177,7 +191,7 @@ impl<'d> Losses<'d> {
             }
             let mut lost = 0.0;
             bin.each(soup, |triangle| {
-                let count = self.counts.get(triangle.source.into())?;
+                let [count, _] = self.counts.get(triangle.source.into())?;
                 if count > 0 && self.is_judged(triangle, bin.brick) {
                     lost += f64::from(count);
                 }

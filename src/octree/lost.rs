@@ -4,7 +4,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::store::Record;
 
-/// How many hits of a triangle lie on edges whose two ends are both outside. 8 bytes.
+/// How many hits of a triangle lie on edges whose two ends are both outside. 12 bytes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct LostHits {
@@ -12,11 +12,13 @@ pub struct LostHits {
     pub source: u32,
     /// How many, in one brick.
     pub count: u32,
+    /// Of these, on edges whose four parallel neighbours are hit as well: away from any rim.
+    pub inner: u32,
 }
 
 impl Record for LostHits {
-    type Key = (u32, u32);
+    type Key = (u32, u32, u32);
     fn key(&self) -> Self::Key {
-        (self.source, self.count)
+        (self.source, self.count, self.inner)
     }
 }

@@ -8,8 +8,8 @@
 //! Memory:  the share; a brick per worker.
 
 use crate::octree::{
-    ArchivedHitBrick, Flips, HitEdge, LINES, LostHits, ROWS, Regions, SIDE, SourcePlane,
-    decode_hits, edge_position, find_regions,
+    ArchivedHitBrick, EdgeBits, Flips, HitEdge, LINES, LostHits, ROWS, Regions, SIDE, SourcePlane,
+    decode_hits, edge_index, edge_position, find_regions,
 };
 use crate::sign::SignError;
 use crate::sign::flooded::{Flooded, OUTSIDE};
@@ -57,7 +57,7 @@ pub fn find_lost(
                 let region = usize::from(regions.at(at));
                 known[region] & OUTSIDE != 0 || specks[region]
             };
-            Ok(lost_of(decode_hits(&view)?, is_outside))
+            Ok(lost_of(decode_hits(&view)?, &loaded.barrier, is_outside))
         },
         |found: Vec<LostHits>| Ok::<(), SignError>(lost.extend(&found)?),
     )?;
@@ -120,8 +120,22 @@ fn are_parallel(brick: &ArchivedHitBrick, hits: &[rkyv::rend::u32_le]) -> bool {
     cosine.abs() >= PARALLEL
 }
 
-fn lost_of(brick: &ArchivedHitBrick, is_outside: impl Fn([usize; 3]) -> bool) -> Vec<LostHits> {
-    let mut counts = vec![0_u32; brick.planes.len()];
+/// Whether the four edges beside one are hit as well. What lies beyond the brick is not asked.
+fn is_inner(barrier: &EdgeBits, axis: usize, at: [usize; 3]) -> bool {
+    (0..3).filter(|across| *across != axis).all(|across| {
+        let (mut below, mut above) = (at, at);
+        below[across] = below[across].saturating_sub(1);
+        above[across] += 1;
+        [below, above].iter().all(|beside| barrier.get(edge_index(axis, *beside)))
+    })
+}
+
+fn lost_of(
+    brick: &ArchivedHitBrick,
+    barrier: &EdgeBits,
+    is_outside: impl Fn([usize; 3]) -> bool,
+) -> Vec<LostHits> {
+    let mut counts = vec![[0_u32; 2]; brick.planes.len()];
     let mut first = 0;
     for edge in brick.edges.iter() {
         let edge = HitEdge { bits: edge.bits.to_native(), signed_sum: 0 };
@@ -133,11 +147,18 @@ fn lost_of(brick: &ArchivedHitBrick, is_outside: impl Fn([usize; 3]) -> bool) ->
         let hits = &brick.hits[hits];
         let is_lost = at.iter().all(|&c| c < SIDE) && is_outside(at) && is_outside(beyond);
         if is_lost && are_parallel(brick, hits) {
+            let inner = u32::from(is_inner(barrier, axis, at));
             for hit in hits {
-                counts[hit.to_native() as usize] += 1;
+                let [count, within] = &mut counts[hit.to_native() as usize];
+                *count += 1;
+                *within += inner;
             }
         }
     }
-    let planes = counts.into_iter().zip(brick.planes.iter()).filter(|(count, _)| *count > 0);
-    planes.map(|(count, plane)| LostHits { source: plane.source.to_native(), count }).collect()
+    let planes = counts.into_iter().zip(brick.planes.iter()).filter(|([count, _], _)| *count > 0);
+    let lost = planes.map(|([count, inner], plane)| {
+        let source = plane.source.to_native();
+        LostHits { source, count, inner }
+    });
+    lost.collect()
 }
