@@ -8,7 +8,7 @@ use brickmend::octree::{
     AXIS_EDGES, AttributeRecord, BinEntry, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick,
     FlipRecord, HitBrick, HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle,
     SourcePlane, TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index,
-    encode,
+    encode, face_index,
 };
 use brickmend::paint::{AskedPlace, DrawnCorner, DrawnTriangle};
 use brickmend::scan::HAS_ODD_FACES;
@@ -327,13 +327,18 @@ fn sign_and_cell_bricks_are_as_documented() {
         crossings,
         planes: Vec::new(),
         borders: Vec::new(),
+        walls: vec![face_index(1, [2, 3, 4])],
     });
     let signs = decode_signs(&bytes).expect("what was written validates");
     assert_eq!((size_of_val(&signs.base_inside), size_of_val(&signs.crossings[0])), (1, 8));
+    says("SignBrick", "32768 * axis + x + 32 y + 1024 z");
+    assert_eq!(signs.walls[0].to_native(), 32768 + 2 + 32 * 3 + 1024 * 4);
+    let beyond = SignBrick { walls: vec![3 * 32768], ..SignBrick::default() };
+    assert!(decode_signs(&encode(&beyond)).is_err(), "there are three axes");
     says("CellBrick", "bits  0..14  cell number");
     says("CellBrick", "bits 15..22  corner mask");
-    says("CellBrick", "bit      23  a face of the cell is flipped");
-    says("CellBrick", "bit      24  one vertex for all components");
+    says("CellBrick", "bits 23..28  a bit for each face");
+    says("CellBrick", "bit      29  one vertex for all components");
     let brick = CellBrick {
         cells: vec![1 << 23],
         positions: vec![[1, 2, 3]],
@@ -345,8 +350,8 @@ fn sign_and_cell_bricks_are_as_documented() {
     assert_eq!(size_of_val(&cells.cells[0]), 4);
     assert_eq!(size_of_val(&cells.positions[0]), 12);
     assert_eq!(size_of_val(&cells.offsets[0]), 2);
-    let beyond = CellBrick { cells: vec![1 << 25], ..CellBrick::default() };
-    assert!(decode_cells(&encode(&beyond)).is_err(), "bits 25..31 are zero");
+    let beyond = CellBrick { cells: vec![1 << 30], ..CellBrick::default() };
+    assert!(decode_cells(&encode(&beyond)).is_err(), "bits 30..31 are zero");
 }
 
 #[test]

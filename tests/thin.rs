@@ -6,6 +6,18 @@ use glam::{DMat3, DVec3};
 
 use crate::support::run::{Encoding, Workshop, at_depth, repair_soup, same_whatever_the_limits};
 
+/// A soup in some pose, by what it is where a cell is so wide; the width depends on the pose, and
+/// hardly on a wall's thickness.
+fn in_cells(make: impl Fn(f64) -> Vec<Corners>, random: &mut Random) -> Vec<Corners> {
+    let (turn, by) = (rotation(random), DVec3::from(random.point()));
+    let posed = |cell: f64| transform(&make(cell), turn, by);
+    let cell = (0..3).fold(1.0 / 57.0, |cell, _| {
+        let (outcome, _) = repair_soup(&posed(cell), &at_depth(6)).expect("a result");
+        outcome.cell_size
+    });
+    posed(cell)
+}
+
 /// A plate of 1 x 1 and so many cells of depth 6, whose cells are about 1/57 wide, in some pose.
 fn plate(cells: f64, random: &mut Random) -> Vec<Corners> {
     let soup = cuboid([0.0; 3], [1.0, 1.0, cells / 57.0]);
@@ -27,6 +39,47 @@ fn a_plate_far_thinner_than_a_cell_stays_whole() {
             assert_eq!(outcome.thickened.triangles > 0, cells < 1.0, "{cells} cells");
         }
     }
+}
+
+#[test]
+fn a_plate_of_about_a_cell_has_no_tunnel() {
+    let mut random = Random::new(13);
+    for cells in [0.8, 0.95, 1.02, 1.1, 1.3, 1.7] {
+        for pose in 0..4 {
+            let soup = in_cells(|cell| cuboid([0.0; 3], [1.0, 1.0, cells * cell]), &mut random);
+            let (outcome, surface) = repair_soup(&soup, &at_depth(6)).expect("a result");
+            let (parts, euler) = (surface.proof.components, surface.proof.euler_characteristic);
+            assert!(parts <= 4 && euler == 2 * parts as i64, "{cells}, {pose}: {parts} {euler}");
+            let told = surface.proof.volume / outcome.cell_size;
+            assert!(told > cells * 0.7 && told < cells + 2.6, "{cells} cells: {told}");
+        }
+    }
+}
+
+#[test]
+fn a_gap_of_about_a_cell_stays_one() {
+    let mut random = Random::new(14);
+    for cells in [1.02, 1.1, 1.3, 1.7] {
+        let two = |cell: f64| {
+            let gap = cells * cell;
+            let mut soup = cuboid([0.0; 3], [1.0, 1.0, 0.2]);
+            soup.extend(cuboid([0.0, 0.0, 0.2 + gap], [1.0, 1.0, 0.4 + gap]));
+            soup
+        };
+        let (_, surface) =
+            repair_soup(&in_cells(two, &mut random), &at_depth(6)).expect("a result");
+        let proof = &surface.proof;
+        assert_eq!((proof.components, proof.euler_characteristic), (2, 4), "{cells} cells");
+    }
+}
+
+#[test]
+fn walls_of_about_a_cell_are_the_same_whatever_the_memory_and_the_threads() {
+    let wall = |cell: f64| cuboid([0.0; 3], [1.0, 1.0, 1.02 * cell]);
+    let soup = in_cells(wall, &mut Random::new(15));
+    same_whatever_the_limits(&soup, &at_depth(6), |outcome| {
+        assert!(outcome.sign.walled_faces > 100);
+    });
 }
 
 #[test]

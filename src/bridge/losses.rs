@@ -24,6 +24,11 @@ const LOST_SHARE: f64 = 0.15;
 /// The same of hits away from any rim, each of which is a hole in the wall.
 const LOST_INNER_SHARE: f64 = 0.01;
 
+/// The same of a large triangle by itself, and how many it has to lose: around a few holes in a large
+/// wall only its triangles get thicker, not all of a brick's piece.
+const PIERCED_SHARE: f64 = 0.001;
+const LEAST_PIERCED: f64 = 2.0;
+
 /// Share of its hits that a large triangle of a torn piece has to lose to be taken for a part of it.
 const BRINK_SHARE: f64 = 0.03;
 
@@ -53,7 +58,13 @@ impl Hits {
     pub(crate) fn tears(self, alone: Self) -> bool {
         let is_large = alone.expected >= LEAST_HITS;
         let takes_part = !is_large || alone.lost >= BRINK_SHARE * alone.expected;
-        is_large && alone.are_torn() || takes_part && self.are_torn()
+        alone.is_torn_alone() || takes_part && self.are_torn()
+    }
+
+    /// Whether this is all of a large triangle that is torn.
+    fn is_torn_alone(self) -> bool {
+        let is_pierced = self.inner >= LEAST_PIERCED && self.inner >= PIERCED_SHARE * self.expected;
+        self.expected >= LEAST_HITS && (self.are_torn() || is_pierced)
     }
 
     pub(crate) fn are_torn(self) -> bool {
@@ -167,7 +178,7 @@ impl<'d> Losses<'d> {
             let mut is_torn = false;
             bin.each(soup, |triangle| {
                 is_torn |=
-                    self.is_judged(triangle, bin.brick) && self.hits_of(triangle)?.are_torn();
+                    self.is_judged(triangle, bin.brick) && self.hits_of(triangle)?.is_torn_alone();
                 Ok(())
             })?;
             if is_torn {
@@ -197,7 +208,7 @@ impl<'d> Losses<'d> {
                 }
                 Ok(())
             })?;
-            if lost >= LEAST_LOST {
+            if lost >= LEAST_PIERCED {
                 hurt.insert(bin.brick.0);
             }
         }

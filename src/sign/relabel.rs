@@ -8,7 +8,7 @@ use crate::octree::{
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
-use crate::sign::tips::take_off_tips;
+use crate::sign::tips::{apart, find_tips};
 use crate::sign::walls::find_walls;
 use crate::sign::{FillRule, SIGNS, SignError, SignStats};
 use crate::store::{BrickFile, BrickPass, Resources, ordered_by_weight};
@@ -95,8 +95,9 @@ impl Workspace {
         }
         self.parity.from_marks(&self.loaded.marks, item.base_inside);
         self.set_signs(&regions, item, rule)?;
-        let tip_corners = take_off_tips(&mut self.signs);
         self.marks.set_differences(&self.signs);
+        let cell_units = f64::from(domain.cell_units);
+        let tip_corners = self.take_off_tips(record, &item.load.flips, cell_units);
         let mut stats = self.count();
         stats.tip_corners = tip_corners;
         let mut brick = self.pick_crossings(record, &item.load.flips, &mut stats);
@@ -106,7 +107,6 @@ impl Workspace {
             let view = borders.view(number)?;
             brick.borders.extend(decode_borders(&view)?.borders.iter().map(Border::from));
         }
-        let cell_units = f64::from(domain.cell_units);
         brick.walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
         stats.walled_faces = brick.walls.len() as u64;
         stats.bricks = u64::from(!brick.crossings.is_empty());
@@ -142,6 +142,28 @@ impl Workspace {
             self.sealed.rows[row] = sealed;
         }
         Ok(())
+    }
+
+    /// Takes off the tips that no walled faces hold; how many corners that were.
+    fn take_off_tips(
+        &mut self,
+        record: Option<&ArchivedHitBrick>,
+        flips: &[FlipRecord],
+        cell_units: f64,
+    ) -> u64 {
+        let tips = find_tips(&self.signs);
+        if tips.is_empty() {
+            return 0;
+        }
+        // The walls as they are with all tips on.
+        let brick = self.pick_crossings(record, flips, &mut SignStats::default());
+        let walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
+        let tips = apart(&self.signs, &tips, &walls);
+        for [x, y, z] in &tips {
+            self.signs.rows[z * LINES + y] &= !(1 << x);
+        }
+        self.marks.set_differences(&self.signs);
+        tips.len() as u64
     }
 
     /// Counts corners that the brick owns, and leaf cells.
