@@ -106,7 +106,8 @@ impl Workshop {
         let rule = FillRule::Solid;
         let (flooded, _) =
             flood(hits, flips, (rule, false), &model.domain, &resources).expect("sign works");
-        assign_signs((hits, None), flips, &flooded, rule, &resources).expect("sign works")
+        assign_signs((hits, None), flips, &flooded, (rule, &model.domain), &resources)
+            .expect("sign works")
     }
 
     pub fn place(

@@ -172,7 +172,8 @@ pub struct ContourStats {
     pub cells: u64,
     /// Cells with two vertices or more.
     pub multi_cells: u64,
-    /// Ambiguous faces that were flipped to keep the surface manifold, counted once per cell.
+    /// Ambiguous faces that are not as walls and gaps would have them, to keep the surface manifold;
+    /// counted once per cell.
     pub flipped_faces: u64,
     /// Vertices in cells; on edges by marching cubes.
     pub cell_vertices: u64,

@@ -146,7 +146,7 @@ fn the_table_turns_with_the_cell() {
                 .expect("symmetries map edges to edges")
         };
         let image_of_face = |face: u8| {
-            let corners = corners_of_face(face).map(|corner| moved(corner));
+            let corners = corners_of_face(face).map(moved);
             let is_there = |f: &u8| corners.iter().all(|c| corners_of_face(*f).contains(c));
             (0..6_u8).find(is_there).expect("symmetries map faces to faces")
         };
