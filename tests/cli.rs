@@ -314,6 +314,30 @@ fn a_preview_is_a_png_and_a_work_folder_elsewhere_is_left_empty() {
 }
 
 #[test]
+fn a_png_has_as_many_views_as_are_asked_for() {
+    let folder = folder();
+    let picture = folder.path().join("out.png");
+    let picture_text = picture.to_string_lossy().into_owned();
+    let size_of = |more: &[&str]| {
+        let extra = [&["--depth", "4", "--no-deviation", "--preview", &picture_text], more];
+        let output = folder.path().join("out.stl");
+        let (code, _, err) = repair(&model(CUBE), &output, &extra.concat());
+        assert_eq!(code, 0, "{more:?}: {err}");
+        let bytes = std::fs::read(&picture).expect("the picture is there");
+        [16, 20].map(|at| u32::from_be_bytes(bytes[at..at + 4].try_into().expect("four bytes")))
+    };
+    // Two panels with a line between them; each has its views in two rows.
+    for (more, size) in [
+        (&[][..], [2 * 900 + 4, 900]),
+        (&["--preview-views", "6"], [2 * 3 * 512 + 4, 2 * 512]),
+        (&["--preview-views", "14"], [2 * 7 * 512 + 4, 2 * 512]),
+        (&["--preview-views", "14", "--max-memory", "64MiB"], [2 * 7 * 512 + 4, 2 * 512]),
+    ] {
+        assert_eq!(size_of(more), size, "{more:?}");
+    }
+}
+
+#[test]
 fn the_help_names_every_exit_code() {
     let run = brickmend().args(["repair", "--help"]).output().expect("the program starts");
     let text = String::from_utf8(run.stdout).expect("text");

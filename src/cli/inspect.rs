@@ -40,8 +40,8 @@ pub struct InspectArguments {
     /// What a model unit is, for files that do not say so.
     #[arg(long, value_name = "UNIT", value_parser = parse_unit)]
     units: Option<LengthUnit>,
-    /// Write all edges and triangles with a defect into this folder, one PLY for each kind that is
-    /// found; of one FILE. See docs/inspect.md.
+    /// Write all points, edges and triangles with a defect into this folder, one PLY for each kind that
+    /// is found; of one FILE. See docs/inspect.md.
     #[arg(long, value_name = "DIR")]
     export: Option<PathBuf>,
     #[command(flatten)]

@@ -12,8 +12,8 @@ use brickmend::report::{
 };
 use brickmend::store::Scratch;
 
-/// Width and height of a view of an EXR file: there are many.
-const LAYER_PX: u32 = 512;
+/// Width and height of a view where there are many.
+const VIEW_PX: u32 = 512;
 
 /// A model before and after.
 pub(crate) struct Pictured<'a> {
@@ -47,7 +47,8 @@ impl Pictured<'_> {
 /// How a preview is drawn.
 pub(crate) struct DrawOptions {
     pub(crate) has_edges: bool,
-    pub(crate) views: Views,
+    /// From where the model is seen, if it is said.
+    pub(crate) views: Option<Views>,
 }
 
 /// Draws input, output and the map; a sixth of the memory budget is for all of them.
@@ -68,15 +69,14 @@ pub(crate) fn draw_preview(
     let output: &OpenSource<brickmend::io::IoError> = &|| open(pictured.output);
     let drawing =
         PreviewOptions { share_bytes, edges: drawn.has_edges, ..PreviewOptions::default() };
-    let options = match has_extension(path, "exr") {
-        true => PreviewOptions {
-            width_px: LAYER_PX,
-            height_px: LAYER_PX,
-            views: drawn.views,
-            patches: pictured.patch_rule(),
-            ..drawing
-        },
-        false => drawing,
+    let is_exr = has_extension(path, "exr");
+    let options = match drawn.views.or(is_exr.then_some(Views::Six)) {
+        Some(views) => PreviewOptions { width_px: VIEW_PX, height_px: VIEW_PX, views, ..drawing },
+        None => drawing,
+    };
+    let options = match is_exr {
+        true => PreviewOptions { patches: pictured.patch_rule(), ..options },
+        false => options,
     };
     let threads = pictured.limits.threads;
     let measuring = pictured.is_measured.then_some(Measuring { scratch: &scratch, threads });

@@ -62,10 +62,11 @@ pub struct RepairArguments {
     /// output lies from the input.
     #[arg(long, value_name = "FILE.html", help_heading = "Report")]
     report: Option<PathBuf>,
-    /// How many views an EXR file has: 6 along the axes, or 8 more from the corners of a cube.
-    #[arg(long, value_name = "6|14", default_value = "6", requires = "preview", value_parser = ["6", "14"],
+    /// From how many sides the picture shows the model: 6 along the axes, or 8 more from the corners of
+    /// a cube [default: 6 in an EXR file, one from the front, the right and above in a PNG file].
+    #[arg(long, value_name = "6|14", requires = "preview", value_parser = ["6", "14"],
           help_heading = "Report")]
-    preview_views: String,
+    preview_views: Option<String>,
     /// Draw the edges of the triangles as well.
     #[arg(long, requires = "preview", help_heading = "Report")]
     preview_edges: bool,
@@ -337,7 +338,10 @@ fn drawn(
     let path = arguments.preview.as_ref()?;
     let options = DrawOptions {
         has_edges: arguments.preview_edges,
-        views: if arguments.preview_views == "14" { Views::Fourteen } else { Views::Six },
+        views: arguments.preview_views.as_deref().map(|views| match views {
+            "14" => Views::Fourteen,
+            _ => Views::Six,
+        }),
     };
     let error = draw_preview(path, &pictured(arguments, outcome), &options).err()?;
     chatter.error(&Refused(format!("{}: the preview failed: {error}", path.display())));

@@ -1,7 +1,7 @@
-//! All triangles and edges with a defect, for those who want more than the first places.
+//! All triangles, edges and vertices with a defect, for those who want more than the first places.
 //!
-//! In:         numbers of triangles, and of their corners, from finders on any thread.
-//! Out:        the same by kind, triangle and corner, each once.
+//! In:         numbers of triangles, of their corners, and of vertices, from finders on any thread.
+//! Out:        the same by kind, number and corner, each once.
 //! Invariant:  the result depends on what was marked, not on order, threads or share.
 //! Memory:     the share of the sort.
 //! Fails:      only as [`StoreError`].
@@ -13,23 +13,69 @@ use bytemuck::{Pod, Zeroable};
 use crate::defect::DefectKind;
 use crate::store::{Record, Scratch, Sorted, Sorter, StoreError};
 
-/// The corner of a mark that stands for a whole triangle.
+/// The corner of a mark that stands for a whole triangle, or for a vertex.
 const WHOLE: u32 = 3;
 
-/// A triangle or one of its edges that has a defect.
+/// What is marked where a kind of defect is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Marked {
+    /// Whole triangles.
+    Triangle,
+    /// Edges of triangles.
+    Edge,
+    /// Corners of triangles.
+    Corner,
+    /// Vertices by their numbers.
+    Vertex,
+}
+
+impl Marked {
+    /// What is marked with a kind; `None` where there is nothing to show, or others show it.
+    #[must_use]
+    pub const fn with(kind: DefectKind) -> Option<Self> {
+        match kind {
+            // They have no place; and rims are made of boundary edges.
+            DefectKind::NonfiniteTriangle
+            | DefectKind::WildFace
+            | DefectKind::ShortFace
+            | DefectKind::OpenLoop => None,
+            DefectKind::BoundaryEdge
+            | DefectKind::NonmanifoldEdge
+            | DefectKind::InconsistentEdge => Some(Self::Edge),
+            DefectKind::TJunction => Some(Self::Corner),
+            DefectKind::NonmanifoldVertex
+            | DefectKind::CoincidentVertices
+            | DefectKind::IsolatedVertex => Some(Self::Vertex),
+            DefectKind::InwardComponent
+            | DefectKind::IntersectingTriangles
+            | DefectKind::OverlappingTriangles
+            | DefectKind::DuplicateTriangle
+            | DefectKind::DegenerateTriangle
+            | DefectKind::Fin
+            | DefectKind::OpenShell
+            | DefectKind::ThinWall
+            | DefectKind::HiddenShell
+            | DefectKind::TinyShell
+            | DefectKind::TouchingTriangles => Some(Self::Triangle),
+        }
+    }
+}
+
+/// A triangle, one of its edges or corners, or a vertex that has a defect.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 struct Mark {
     kind: u32,
-    triangle: u32,
-    /// The corner that an edge begins at, or [`WHOLE`].
+    /// Of the triangle, or of the vertex.
+    number: u32,
+    /// The corner, that an edge begins at as well, or [`WHOLE`].
     corner: u32,
 }
 
 impl Record for Mark {
     type Key = (u32, u32, u32);
     fn key(&self) -> Self::Key {
-        (self.kind, self.triangle, self.corner)
+        (self.kind, self.number, self.corner)
     }
 }
 
@@ -39,19 +85,6 @@ pub struct Marks {
 }
 
 impl Marks {
-    /// Kinds whose triangles are marked.
-    pub const OF_TRIANGLES: [DefectKind; 6] = [
-        DefectKind::IntersectingTriangles,
-        DefectKind::OverlappingTriangles,
-        DefectKind::TouchingTriangles,
-        DefectKind::DuplicateTriangle,
-        DefectKind::Fin,
-        DefectKind::HiddenShell,
-    ];
-    /// Kinds whose edges are marked.
-    pub const OF_EDGES: [DefectKind; 3] =
-        [DefectKind::BoundaryEdge, DefectKind::NonmanifoldEdge, DefectKind::InconsistentEdge];
-
     /// No marks yet; the sort takes at most `share_bytes`.
     #[must_use]
     pub fn new(scratch: &Scratch, share_bytes: u64) -> Self {
@@ -66,18 +99,26 @@ impl Marks {
         triangles.iter().try_for_each(|&triangle| self.push(kind, triangle, WHOLE))
     }
 
-    /// Marks the edge that begins at a corner, 0 to 2, of a triangle.
+    /// Marks a corner, 0 to 2, of a triangle, or the edge that begins there.
     ///
     /// # Errors
     /// The scratch disk fails.
-    pub fn edge(&self, kind: DefectKind, triangle: u32, corner: u32) -> Result<(), StoreError> {
-        assert!(corner < WHOLE, "a triangle has three edges");
+    pub fn corner(&self, kind: DefectKind, triangle: u32, corner: u32) -> Result<(), StoreError> {
+        assert!(corner < WHOLE, "a triangle has three corners");
         self.push(kind, triangle, corner)
     }
 
-    fn push(&self, kind: DefectKind, triangle: u32, corner: u32) -> Result<(), StoreError> {
+    /// Marks a vertex by its number.
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn vertex(&self, kind: DefectKind, vertex: u32) -> Result<(), StoreError> {
+        self.push(kind, vertex, WHOLE)
+    }
+
+    fn push(&self, kind: DefectKind, number: u32, corner: u32) -> Result<(), StoreError> {
         let mut sorter = self.sorter.lock().unwrap_or_else(PoisonError::into_inner);
-        sorter.push(Mark { kind: kind as u32, triangle, corner })
+        sorter.push(Mark { kind: kind as u32, number, corner })
     }
 
     /// Sorts what was marked.
@@ -92,7 +133,7 @@ impl Marks {
     }
 }
 
-/// Marks by kind, triangle and corner.
+/// Marks by kind, number and corner.
 pub struct SortedMarks {
     sorted: Sorted<Mark>,
     next: Option<Mark>,
@@ -106,8 +147,8 @@ impl SortedMarks {
         DefectKind::ALL.into_iter().find(|&kind| kind as u32 == next.kind)
     }
 
-    /// The next mark if it is one of this kind and triangle: the corner that its edge begins at, or
-    /// `None` for the whole triangle.
+    /// The next mark if it is one of this kind and triangle: the corner, or `None` for the whole
+    /// triangle.
     ///
     /// # Errors
     /// The scratch disk fails.
@@ -116,12 +157,27 @@ impl SortedMarks {
         kind: DefectKind,
         triangle: u64,
     ) -> Result<Option<Option<u32>>, StoreError> {
-        let own = |mark: &Mark| mark.kind == kind as u32 && u64::from(mark.triangle) == triangle;
+        let own = |mark: &Mark| mark.kind == kind as u32 && u64::from(mark.number) == triangle;
         let Some(mark) = self.next.filter(own) else { return Ok(None) };
+        self.pass(mark)?;
+        Ok(Some(Some(mark.corner).filter(|&corner| corner != WHOLE)))
+    }
+
+    /// The number of the next mark if it is one of this kind.
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn take_any(&mut self, kind: DefectKind) -> Result<Option<u32>, StoreError> {
+        let Some(mark) = self.next.filter(|mark| mark.kind == kind as u32) else { return Ok(None) };
+        self.pass(mark)?;
+        Ok(Some(mark.number))
+    }
+
+    fn pass(&mut self, mark: Mark) -> Result<(), StoreError> {
         // A triangle may be in many pairs.
         while self.next == Some(mark) {
             self.next = self.sorted.next()?;
         }
-        Ok(Some(Some(mark.corner).filter(|&corner| corner != WHOLE)))
+        Ok(())
     }
 }

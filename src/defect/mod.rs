@@ -40,7 +40,7 @@ pub use intersecting_triangles::{IntersectingTriangles, Meeting, MeetingCounts};
 pub use inward_component::InwardComponent;
 pub use isolated_vertex::IsolatedVertex;
 pub use kind::DefectKind;
-pub use marks::{Marks, SortedMarks};
+pub use marks::{Marked, Marks, SortedMarks};
 pub use nonfinite_triangle::NonfiniteTriangle;
 pub use nonmanifold_edge::NonmanifoldEdge;
 pub use nonmanifold_vertex::NonmanifoldVertex;

@@ -115,7 +115,7 @@ pub(crate) fn mark(sides: &Sequence<Side>, marks: &Marks) -> Result<(), StoreErr
                 2 => DefectKind::InconsistentEdge,
                 _ => DefectKind::NonmanifoldEdge,
             };
-            marks.edge(kind, side.side / 3, side.side % 3)
+            marks.corner(kind, side.side / 3, side.side % 3)
         })
     })
 }

@@ -1,6 +1,6 @@
 //! Shells of which nothing can be seen from outside.
 
-use crate::defect::{Defect, DefectKind, HiddenShell, Marks};
+use crate::defect::{Defect, DefectKind, HiddenShell};
 use crate::diagnose::Means;
 use crate::diagnose::finding::{Finding, Measure, SizedPlaces};
 use crate::diagnose::model::Model;
@@ -12,7 +12,6 @@ use crate::store::{SequencePeek, StoreError};
 pub(crate) fn find(
     model: &Model,
     shells: &mut Shells,
-    marks: Option<&Marks>,
     means: &Means<'_>,
 ) -> Result<Finding, StoreError> {
     let sight = model.facts().bounds.and_then(Sight::new);
@@ -60,18 +59,6 @@ pub(crate) fn find(
             };
             largest.offer(sums.area, sums.first, Defect::HiddenShell(hidden));
         }
-    }
-    if let Some(marks) = marks.filter(|_| count > 0) {
-        model.each(means, |triangle| {
-            if !triangle.is_whole() {
-                return Ok(());
-            }
-            let shell = shells.of(triangle.number)?;
-            match shells.sums(shell)?.is_seen {
-                0 => marks.triangles(DefectKind::HiddenShell, &[triangle.number as u32]),
-                _ => Ok(()),
-            }
-        })?;
     }
     let size = (Measure::TotalArea, area);
     Ok(Finding::sized(DefectKind::HiddenShell, count, size, largest.into_places()))

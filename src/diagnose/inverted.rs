@@ -86,6 +86,7 @@ impl Tally {
         asked.sort_by_key(|asked| asked.shell);
         for own in asked.drain(..).filter(|own| !own.is_inside) {
             self.count += 1;
+            shells.turn(own.shell)?;
             self.area += own.area;
             let (triangle, position) = (own.first, own.position);
             let defect = InwardComponent { triangle, position };

@@ -44,6 +44,14 @@ pub(crate) struct Rim {
     unused: u32,
 }
 
+impl Rim {
+    /// Three times its triangle, and the corners that its ends are there.
+    pub(crate) fn corners(&self) -> [u32; 2] {
+        let (first, corner) = (self.side / 3 * 3, self.side % 3);
+        [first + corner, first + (corner + 1) % 3]
+    }
+}
+
 pub(crate) fn distance([a, b]: [[f64; 3]; 2]) -> f64 {
     glam::DVec3::from(a).distance(glam::DVec3::from(b))
 }

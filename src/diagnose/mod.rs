@@ -97,7 +97,7 @@ pub struct Diagnosis {
     pub findings: Vec<Finding>,
 }
 
-/// Looks at a model that has been read, and marks all edges and triangles of [`Marks`] if asked.
+/// Looks at a model that has been read, and marks all that has a defect if asked.
 ///
 /// # Errors
 /// The scratch disk fails, or the monitor asks to stop.
@@ -109,8 +109,11 @@ pub fn diagnose(
 ) -> Result<Diagnosis, StoreError> {
     let mut findings = Vec::new();
     findings.push(duplicates::find(model, marks, means)?);
-    findings.push(isolated::find(model, means)?);
+    findings.push(isolated::find(model, marks, means)?);
     findings.push(model.coincident());
+    if let Some(marks) = marks {
+        model.mark_coincident(marks, means)?;
+    }
     // What a look needs no more goes before the next one begins: each has most of the share.
     let Edges { shells: mut labels, mut sheets, sides, count } = Edges::find(model, means)?;
     findings.push(fins::find(model, &mut sheets, &sides, marks, means)?);
@@ -121,17 +124,20 @@ pub fn diagnose(
     let mut shells = Shells::measure(model, &mut labels, &sides, means)?;
     drop(labels);
     findings.push(inverted::find(model, &mut shells, means)?);
-    findings.push(hidden::find(model, &mut shells, marks, means)?);
+    findings.push(hidden::find(model, &mut shells, means)?);
     let (report, mut of_shells) = shells.report(tolerances.tiny, means)?;
     findings.append(&mut of_shells);
+    if let Some(marks) = marks {
+        shells.mark(model, tolerances.tiny, marks, means)?;
+    }
     drop(shells);
     let (rims, crowded_length) = loops::open_edges(model, &sides, means)?;
     drop(sides);
     let (loops, mut of_loops) = loops::trace(model, &rims, means)?;
     findings.append(&mut of_loops);
-    findings.push(t_junctions::find(&rims, tolerances.junction, model, means)?);
+    findings.push(t_junctions::find(&rims, tolerances.junction, model, marks, means)?);
     drop(rims);
-    findings.push(thin::find(model, tolerances.thin, means)?);
+    findings.push(thin::find(model, tolerances.thin, marks, means)?);
     findings.sort_by_key(|finding| finding.kind);
     Ok(Diagnosis { loops, shells: report, edges: count, crowded_length, findings })
 }

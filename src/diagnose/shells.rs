@@ -7,7 +7,7 @@ use std::cmp::Reverse;
 
 use serde::{Deserialize, Serialize};
 
-use crate::defect::{Defect, DefectKind, OpenShell, Smallest, TinyShell};
+use crate::defect::{Defect, DefectKind, Marks, OpenShell, Smallest, TinyShell};
 use crate::diagnose::Means;
 use crate::diagnose::edges::Side;
 use crate::diagnose::finding::{Finding, Measure, SizedPlaces};
@@ -83,6 +83,41 @@ impl Shells {
         let mut sums = self.sets.sums.get(shell)?;
         sums.is_seen = 1;
         self.sets.sums.set(shell, sums)
+    }
+
+    /// Notes that a shell is inside out.
+    pub(crate) fn turn(&mut self, shell: u64) -> Result<(), StoreError> {
+        let mut sums = self.sets.sums.get(shell)?;
+        sums.is_inward = 1;
+        self.sets.sums.set(shell, sums)
+    }
+
+    /// Marks the triangles of shells by what their shells are, once all of that is known.
+    pub(crate) fn mark(
+        &mut self,
+        model: &Model,
+        tiny: f64,
+        marks: &Marks,
+        means: &Means<'_>,
+    ) -> Result<(), StoreError> {
+        model.each(means, |triangle| {
+            if !triangle.is_whole() {
+                return Ok(());
+            }
+            let shell = self.of(triangle.number)?;
+            let sums = self.sums(shell)?;
+            for (kind, is_one) in [
+                (DefectKind::InwardComponent, sums.is_inward == 1),
+                (DefectKind::OpenShell, sums.open_sides > 0),
+                (DefectKind::HiddenShell, sums.is_seen == 0),
+                (DefectKind::TinyShell, sums.diagonal() < tiny),
+            ] {
+                if is_one {
+                    marks.triangles(kind, &[triangle.number as u32])?;
+                }
+            }
+            Ok(())
+        })
     }
 
     /// Tells of all shells, once it is known which are seen.

@@ -43,6 +43,8 @@ pub(crate) struct Sums {
     even_hinges: u64,
     /// Whether something of it is seen, 1 or 0.
     pub(crate) is_seen: u64,
+    /// Whether it is inside out, 1 or 0.
+    pub(crate) is_inward: u64,
 }
 
 /// The sum of the magnitudes of the products in a triple product.

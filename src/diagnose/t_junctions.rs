@@ -9,7 +9,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::defect::{Defect, DefectKind, Smallest, TJunction};
+use crate::defect::{Defect, DefectKind, Marks, Smallest, TJunction};
 use crate::diagnose::Means;
 use crate::diagnose::finding::Finding;
 use crate::diagnose::loops::Rim;
@@ -24,14 +24,16 @@ struct OnEdge {
     vertex: [u64; 3],
     /// Bits of the distance, which are in its order.
     distance: u64,
-    side: u64,
+    side: u32,
+    /// Three times a triangle that has the vertex, and the corner that it is there.
+    corner: u32,
     ends: [[f64; 3]; 2],
 }
 
 impl Record for OnEdge {
-    type Key = ([u64; 3], u64, u64);
+    type Key = ([u64; 3], u64, u32, u32);
     fn key(&self) -> Self::Key {
-        (self.vertex, self.distance, self.side)
+        (self.vertex, self.distance, self.side, self.corner)
     }
 }
 
@@ -52,6 +54,7 @@ pub(crate) fn find(
     rims: &Sequence<Rim>,
     tolerance: f64,
     model: &Model,
+    marks: Option<&Marks>,
     means: &Means<'_>,
 ) -> Result<Finding, StoreError> {
     let kind = DefectKind::TJunction;
@@ -64,16 +67,16 @@ pub(crate) fn find(
         rims.try_for_each(|rim| near.add(rim.side, [0; 3], [rim.ends[0], rim.ends[1], rim.ends[1]]))
     })?;
     rims.each_block(BLOCK, |block| {
-        let mut ends = block.iter().flat_map(|rim| rim.ends);
-        ends.try_for_each(|end| near.probe(0, [0; 3], [end; 3]))
+        let mut ends = block.iter().flat_map(|rim| rim.ends.into_iter().zip(rim.corners()));
+        ends.try_for_each(|(end, corner)| near.probe(corner, [0; 3], [end; 3]))
     })?;
     let mut found = Sorter::new(means.scratch, means.share_bytes / 4);
     near.join(|probe, edge| {
         let (point, ends) = (probe.points[0], [edge.points[0], edge.points[1]]);
         match distance_from_inside(point, ends, tolerance) {
             Some(distance) if distance <= tolerance => {
-                let (distance, side) = (distance.to_bits(), edge.number.into());
-                found.push(OnEdge { vertex: position_key(point), distance, side, ends })
+                let (distance, side, corner) = (distance.to_bits(), edge.number, probe.number);
+                found.push(OnEdge { vertex: position_key(point), distance, side, corner, ends })
             }
             _ => Ok(()),
         }
@@ -86,11 +89,14 @@ pub(crate) fn find(
         if last != Some(next.vertex) {
             last = Some(next.vertex);
             count += 1;
+            if let Some(marks) = marks {
+                marks.corner(kind, next.corner / 3, next.corner % 3)?;
+            }
             let junction = TJunction {
                 position: next.vertex.map(f64::from_bits),
                 ends: next.ends,
                 distance: f64::from_bits(next.distance),
-                triangle: next.side / 3,
+                triangle: u64::from(next.side) / 3,
             };
             places.offer((next.side, next.vertex), Defect::TJunction(junction));
         }

@@ -13,7 +13,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::defect::{Defect, DefectKind, Smallest, ThinWall};
+use crate::defect::{Defect, DefectKind, Marks, Smallest, ThinWall};
 use crate::diagnose::Means;
 use crate::diagnose::finding::{Finding, Measure};
 use crate::diagnose::model::{Corners, Model};
@@ -65,7 +65,12 @@ fn distance_to(from: DVec3, way: DVec3, corners: &Corners) -> Option<f64> {
 }
 
 /// Finds all of them.
-pub(crate) fn find(model: &Model, thin: f64, means: &Means<'_>) -> Result<Finding, StoreError> {
+pub(crate) fn find(
+    model: &Model,
+    thin: f64,
+    marks: Option<&Marks>,
+    means: &Means<'_>,
+) -> Result<Finding, StoreError> {
     let kind = DefectKind::ThinWall;
     let Some(bounds) = model.facts().bounds else { return Ok(Finding::none(kind)) };
     let mut near = Near::new(bounds, (thin, 0.0), means);
@@ -96,11 +101,11 @@ pub(crate) fn find(model: &Model, thin: f64, means: &Means<'_>) -> Result<Findin
             _ => Ok(()),
         }
     })?;
-    conclude(found)
+    conclude(found, marks)
 }
 
 /// Counts the triangles with something behind them, and lists the thinnest places.
-fn conclude(found: Sorter<Behind>) -> Result<Finding, StoreError> {
+fn conclude(found: Sorter<Behind>, marks: Option<&Marks>) -> Result<Finding, StoreError> {
     let mut sorted = found.finish()?;
     let (mut count, mut least) = (0, f64::INFINITY);
     let mut places = Smallest::new();
@@ -109,6 +114,9 @@ fn conclude(found: Sorter<Behind>) -> Result<Finding, StoreError> {
         if last != Some(triangle) {
             last = Some(triangle);
             count += 1;
+            if let Some(marks) = marks {
+                marks.triangles(DefectKind::ThinWall, &[triangle as u32])?;
+            }
             let thickness = f64::from_bits(distance);
             least = least.min(thickness);
             let wall = ThinWall { triangle, thickness, position: middle };

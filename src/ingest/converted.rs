@@ -101,4 +101,12 @@ impl<S: MeshSource + ?Sized> MeshSource for Converted<'_, S> {
     fn vertex_count(&self) -> Option<u64> {
         self.source.vertex_count()
     }
+
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, S::Error> {
+        let is_any = self.source.next_vertices(positions)?;
+        if let Some(factor) = self.factor() {
+            positions.as_flattened_mut().iter_mut().for_each(|number| *number *= factor);
+        }
+        Ok(is_any)
+    }
 }

@@ -30,6 +30,7 @@ mod hostile_tests;
 mod image_kind;
 mod images_beside;
 mod input;
+mod listed;
 mod named;
 mod names;
 mod numbers;

@@ -19,6 +19,8 @@ pub(crate) struct Content {
     pub(crate) materials: Vec<Material>,
     pub(crate) discarded: Discarded,
     pub(crate) vertex_count: Option<u64>,
+    /// Positions of all vertices, used or not.
+    pub(crate) listed: Vec<[f64; 3]>,
 }
 
 impl PartialEq for Content {
@@ -77,7 +79,35 @@ pub(crate) fn read_all(source: &mut dyn MeshSource<Error = IoError>) -> Result<C
         .collect::<Result<_, _>>()?;
     content.discarded = source.discarded();
     content.vertex_count = source.vertex_count();
+    check_listed(source, &mut content)?;
     Ok(content)
+}
+
+/// The vertices that a source lists are as many as it says, and those that triangles name are there.
+fn check_listed(
+    source: &mut dyn MeshSource<Error = IoError>,
+    content: &mut Content,
+) -> Result<(), IoError> {
+    let mut positions = Vec::new();
+    // A hostile file may say that it has billions.
+    if content.vertex_count.is_some_and(|count| count > 1 << 20) {
+        return Ok(());
+    }
+    while source.next_vertices(&mut positions)? {
+        assert!(!positions.is_empty());
+        content.listed.append(&mut positions);
+    }
+    assert!(positions.is_empty() && !source.next_vertices(&mut positions)?);
+    if content.listed.is_empty() {
+        return Ok(());
+    }
+    assert_eq!(Some(content.listed.len() as u64), content.vertex_count);
+    let TriangleBatch { indices, corners, .. } = &content.batch;
+    let bits = |position: &[f64; 3]| position.map(f64::to_bits);
+    for (vertex, corner) in indices.as_flattened().iter().zip(corners.as_flattened()) {
+        assert_eq!(bits(&content.listed[*vertex as usize]), bits(corner), "vertex {vertex}");
+    }
+    Ok(())
 }
 
 fn read_path(path: &Path, share_bytes: u64) -> Result<Content, IoError> {
@@ -154,6 +184,8 @@ proptest! {
             if format.has_indices() {
                 prop_assert_eq!(&content.batch.indices, &triangles);
                 prop_assert_eq!(content.vertex_count, Some(positions.len() as u64));
+                let listed: Vec<_> = positions.iter().map(|p| p.map(written)).collect();
+                prop_assert_eq!(&content.listed, &listed);
             }
         }
     }

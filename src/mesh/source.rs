@@ -102,4 +102,15 @@ pub trait MeshSource {
 
     /// The number of vertices that the file lists, in formats that have indices (after the end).
     fn vertex_count(&self) -> Option<u64>;
+
+    /// Replaces `positions` by those of the next vertices that the file lists, in the order of their
+    /// numbers, whether triangles name them or not; `false` when there were none left. To be asked
+    /// once the last batch was delivered; none where the format has no numbers.
+    ///
+    /// # Errors
+    /// As for [`MeshSource::next_batch`].
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, Self::Error> {
+        positions.clear();
+        Ok(false)
+    }
 }

@@ -52,8 +52,8 @@ pub fn inspect(
     inspect_exporting(input, settings, None, limits, monitor)
 }
 
-/// [`inspect`], and writes all triangles and edges of the kinds of [`Marks`] into the folder
-/// `export`, one PLY for each kind that is found.
+/// [`inspect`], and writes all that has a defect into the folder `export`, one PLY for each kind that
+/// is found and has something to show ([`crate::defect::Marked`]).
 ///
 /// # Errors
 /// As [`inspect`]; the folder cannot be written, or one of its files would be the input.
@@ -102,7 +102,7 @@ pub fn inspect_exporting(
     let means = Means { scratch: &scratch, share_bytes, monitor };
     let diagnosis = diagnose(&model, &tolerances, marks.as_ref(), &means)?;
     if let (Some(folder), Some(marks)) = (export, marks) {
-        inspect_export::write(folder, &model, marks, &means)?;
+        inspect_export::write(folder, (&model, input), marks, &means)?;
     }
     let has_names = model.has_names();
     let facts = facts.clone();

@@ -1,17 +1,20 @@
-//! All triangles and edges with a defect, as files that other tools open.
+//! All that has a defect, as files that other tools open: triangles, edges and points.
 //!
-//! In:         a model, and the marks of an inspection.
+//! In:         a model, and the marks of an inspection; the file once more where it lists vertices
+//!             that no triangle has.
 //! Out:        one PLY for each kind that was found, named after it.
 //! Invariant:  a file is in place when it is complete, by rename. Those of kinds that were not
 //!             found are removed, so that none tells of an earlier inspection. Never the input.
-//! Memory:     a sixteenth of the share for the shapes of one kind.
-//! Fails:      [`RepairError`]: the folder cannot be written, the scratch disk fails.
+//! Memory:     a sixteenth of the share for the shapes of one kind; an eighth for the vertices of one,
+//!             or a quarter for the file.
+//! Fails:      [`RepairError`]: the folder cannot be written, the input or the scratch disk fails.
 
 use std::path::{Path, PathBuf};
 
-use crate::defect::{DefectKind, Marks};
+use crate::defect::{DefectKind, Marked, Marks, SortedMarks};
 use crate::diagnose::{Means, Model};
-use crate::io::{LooseKind, LooseShape, write_loose_shapes};
+use crate::io::{LooseKind, LooseShape, ReadOptions, write_loose_shapes};
+use crate::mesh::TriangleBatch;
 use crate::repair::RepairError;
 use crate::repair::run::keep_input;
 use crate::store::{Sequence, StoreError, sync_folder};
@@ -22,7 +25,7 @@ fn file_of(folder: &Path, kind: DefectKind) -> PathBuf {
 }
 
 fn kinds() -> impl Iterator<Item = DefectKind> {
-    Marks::OF_TRIANGLES.into_iter().chain(Marks::OF_EDGES)
+    DefectKind::ALL.into_iter().filter(|&kind| Marked::with(kind).is_some())
 }
 
 fn failed(operation: &'static str, path: &Path, error: std::io::Error) -> RepairError {
@@ -35,24 +38,22 @@ pub(crate) fn prepare(folder: &Path, input: &Path) -> Result<(), RepairError> {
     kinds().try_for_each(|kind| keep_input(input, &file_of(folder, kind)))
 }
 
-/// Writes what is marked.
+/// Writes what is marked of a model, which was read from `input`.
 pub(crate) fn write(
     folder: &Path,
-    model: &Model,
+    (model, input): (&Model, &Path),
     marks: Marks,
     means: &Means<'_>,
 ) -> Result<(), RepairError> {
     let mut marks = marks.finish().map_err(RepairError::Store)?;
     let mut absent: Vec<DefectKind> = kinds().collect();
     while let Some(kind) = marks.kind() {
-        absent.retain(|&other| other != kind);
-        let mut shapes = Sequence::new(means.scratch, means.share_bytes / 16);
-        model
-            .each_marked(kind, &mut marks, means, |triangle, points| {
-                shapes.push(LooseShape { points, triangle })
-            })
-            .map_err(RepairError::Store)?;
-        write_kind(&file_of(folder, kind), kind, &shapes, means)?;
+        let (loose, shapes) = shapes_of(kind, (model, input), &mut marks, means)?;
+        // A vertex may be at no place.
+        if !shapes.is_empty() {
+            absent.retain(|&other| other != kind);
+            write_kind(&file_of(folder, kind), kind, (loose, &shapes), means)?;
+        }
     }
     for path in absent.into_iter().map(|kind| file_of(folder, kind)) {
         match std::fs::remove_file(&path) {
@@ -65,16 +66,78 @@ pub(crate) fn write(
     sync_folder(folder).map_err(|error| RepairError::Output(error.into()))
 }
 
+/// What is marked with a kind, in the order of the file.
+fn shapes_of(
+    kind: DefectKind,
+    (model, input): (&Model, &Path),
+    marks: &mut SortedMarks,
+    means: &Means<'_>,
+) -> Result<(LooseKind, Sequence<LooseShape>), RepairError> {
+    let mut shapes = Sequence::new(means.scratch, means.share_bytes / 16);
+    let mut push = |number, points| shapes.push(LooseShape { points, number });
+    let loose = match Marked::with(kind) {
+        _ if kind == DefectKind::IsolatedVertex => {
+            each_listed(input, marks, means, |vertex, point| push(vertex, [point; 3]))?;
+            return Ok((LooseKind::Vertices, shapes));
+        }
+        Some(Marked::Vertex) => {
+            model
+                .each_marked_vertex(kind, marks, means, |triangle, point| {
+                    push(triangle, [point; 3])
+                })
+                .map_err(RepairError::Store)?;
+            return Ok((LooseKind::Points, shapes));
+        }
+        Some(Marked::Corner) => LooseKind::Points,
+        Some(Marked::Edge) => LooseKind::Edges,
+        Some(Marked::Triangle) | None => LooseKind::Triangles,
+    };
+    model.each_marked(kind, marks, means, push).map_err(RepairError::Store)?;
+    Ok((loose, shapes))
+}
+
+/// Shows the marked ones of the vertices that no triangle has, as far as they have a place.
+fn each_listed(
+    input: &Path,
+    marks: &mut SortedMarks,
+    means: &Means<'_>,
+    mut visit: impl FnMut(u64, [f64; 3]) -> Result<(), StoreError>,
+) -> Result<(), RepairError> {
+    let options = ReadOptions::in_scene(means.share_bytes / 4);
+    let mut source = crate::io::open(input, means.scratch, &options).map_err(RepairError::Input)?;
+    let stopped = || means.monitor.cancelled().then_some(RepairError::Store(StoreError::Cancelled));
+    let mut batch = TriangleBatch::default();
+    while source.next_batch(&mut batch).map_err(RepairError::Input)? {
+        stopped().map_or(Ok(()), Err)?;
+    }
+    drop(batch);
+    let kind = DefectKind::IsolatedVertex;
+    let mut next = marks.take_any(kind).map_err(RepairError::Store)?;
+    let (mut first, mut positions) = (0_u64, Vec::new());
+    while source.next_vertices(&mut positions).map_err(RepairError::Input)? {
+        stopped().map_or(Ok(()), Err)?;
+        let end = first + positions.len() as u64;
+        while let Some(vertex) = next.map(u64::from).filter(|&vertex| vertex < end) {
+            let position = positions[(vertex - first) as usize];
+            if position.iter().all(|x| x.is_finite()) {
+                visit(vertex, position).map_err(RepairError::Store)?;
+            }
+            next = marks.take_any(kind).map_err(RepairError::Store)?;
+        }
+        first = end;
+    }
+    while next.is_some() {
+        next = marks.take_any(kind).map_err(RepairError::Store)?;
+    }
+    Ok(())
+}
+
 fn write_kind(
     path: &Path,
     kind: DefectKind,
-    shapes: &Sequence<LooseShape>,
+    (loose, shapes): (LooseKind, &Sequence<LooseShape>),
     means: &Means<'_>,
 ) -> Result<(), RepairError> {
-    let loose = match Marks::OF_EDGES.contains(&kind) {
-        true => LooseKind::Edges,
-        false => LooseKind::Triangles,
-    };
     let part = path.with_extension("ply.part");
     let written = write_loose_shapes(&part, kind.noun(0), loose, shapes, means.scratch)
         .map_err(RepairError::Output)

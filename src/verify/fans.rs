@@ -10,6 +10,7 @@
 
 use bytemuck::{Pod, Zeroable};
 
+use crate::defect::Marks;
 use crate::monitor::Monitor;
 use crate::store::{Record, Scratch, ScratchFile, Sequence, StoreError};
 use crate::verify::crowd::judge_by_sorting;
@@ -37,15 +38,15 @@ fn corners_of([a, b, c]: [u32; 3]) -> [Corner; 3] {
     [(a, [b, c]), (b, [c, a]), (c, [a, b])].map(|(vertex, wedge)| Corner { vertex, wedge })
 }
 
-/// Judges all vertices, whose numbers are below `space`.
-pub(crate) fn judge_fans(
+/// Judges all vertices, whose numbers are below `space`; marks those with several fans.
+pub(crate) fn judge_fans<'m>(
     tape: &Tape,
     space: u64,
-    scratch: &Scratch,
-    share_bytes: u64,
+    marks: Option<&'m Marks>,
+    (scratch, share_bytes): (&Scratch, u64),
     monitor: &dyn Monitor,
-) -> Result<Judgement, StoreError> {
-    let mut judgement = Judgement::new(Sequence::new(scratch, share_bytes / 16));
+) -> Result<Judgement<'m>, StoreError> {
+    let mut judgement = Judgement::new(Sequence::new(scratch, share_bytes / 16), marks);
     let needed = range_bytes(tape.len() * 3, space);
     if needed <= share_bytes {
         let visit = |see: &mut dyn FnMut(Corner)| {

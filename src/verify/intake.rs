@@ -5,10 +5,13 @@
 //! Invariant:  the degeneracy test is exact: a f64 filter with an error bound, then exact signs.
 //! Source:     Shewchuk 1997 (adaptive precision), for the filter's bound and exact signs.
 
-use crate::defect::{Defect, DegenerateTriangle, MOST_PLACES, NonfiniteTriangle};
+use crate::defect::{
+    Defect, DefectKind, DegenerateTriangle, MOST_PLACES, Marks, NonfiniteTriangle,
+};
 use crate::geom::signs::{Signs, is_tame};
 use crate::mesh::{Discarded, MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
+use crate::store::StoreError;
 use crate::verify::cone::{Compensated, Cone};
 use crate::verify::intersect::Intersections;
 use crate::verify::tape::{Tape, is_whole, stop_if_asked};
@@ -30,6 +33,8 @@ pub(crate) struct Intake {
     volume: Compensated,
     pub(crate) nonfinite_places: Vec<Defect>,
     pub(crate) degenerate_places: Vec<Defect>,
+    /// Whether the last triangle is degenerate.
+    is_degenerate: bool,
 }
 
 /// Whether all three corners are places.
@@ -38,11 +43,11 @@ pub(crate) fn is_finite(corners: &[[f64; 3]; 3]) -> bool {
     corners.iter().flatten().all(|x| x.is_finite())
 }
 
-/// Reads the file onto the tape.
+/// Reads the file onto the tape, and marks degenerate triangles.
 pub(crate) fn read<S: MeshSource + ?Sized>(
     source: &mut S,
     tape: &mut Tape,
-    vertices: Vertices,
+    (vertices, marks): (Vertices, Option<&Marks>),
     mut intersections: Option<&mut Intersections<'_>>,
     monitor: &dyn Monitor,
 ) -> Result<Intake, VerifyError<S::Error>> {
@@ -57,6 +62,7 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
             let ids = batch.indices.get(at).copied();
             let number = intake.triangles;
             let cone = intake.add(corners, ids);
+            intake.mark(number, marks)?;
             if let (Some(found), true) = (&mut intersections, cone.is_some_and(|c| c.has_area)) {
                 found.add(number, ids, corners)?;
             }
@@ -80,6 +86,7 @@ impl Intake {
     pub(crate) fn add(&mut self, corners: &[[f64; 3]; 3], ids: Option<[u32; 3]>) -> Option<Cone> {
         let triangle = self.triangles;
         self.triangles += 1;
+        self.is_degenerate = false;
         if let Some(ids) = ids {
             let most = u64::from(ids[0].max(ids[1]).max(ids[2])) + 1;
             self.vertices = Some(self.vertices.map_or(most, |so_far| so_far.max(most)));
@@ -103,12 +110,24 @@ impl Intake {
         self.volume.add(cone.volume);
         if ids.is_some_and(|ids| !is_whole(ids)) || !cone.has_area {
             self.degenerate += 1;
+            self.is_degenerate = true;
             if self.degenerate_places.len() < MOST_PLACES {
                 let defect = DegenerateTriangle { triangle, corners: *corners };
                 self.degenerate_places.push(Defect::DegenerateTriangle(defect));
             }
         }
         Some(cone)
+    }
+
+    /// Marks the triangle that was counted last, of this number, if it is degenerate.
+    #[inline]
+    pub(crate) fn mark(&self, triangle: u64, marks: Option<&Marks>) -> Result<(), StoreError> {
+        match marks {
+            Some(marks) if self.is_degenerate => {
+                marks.triangles(DefectKind::DegenerateTriangle, &[triangle as u32])
+            }
+            _ => Ok(()),
+        }
     }
 
     /// Ends the file, which lists so many vertices.

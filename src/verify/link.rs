@@ -3,7 +3,7 @@
 //! Invariant:  a vertex is good iff its records form exactly one cycle in which no neighbour occurs
 //!             twice. An edge is counted at its lower end, so once.
 
-use crate::defect::Smallest;
+use crate::defect::{DefectKind, Marks, Smallest};
 use crate::store::{Parts, Sequence, StoreError};
 
 /// Next and previous vertex of a triangle, seen from its corner at the judged vertex.
@@ -13,7 +13,9 @@ pub(crate) type Wedge = [u32; 2];
 pub(crate) const FEW_WEDGES: usize = 24;
 
 /// Edge counts and vertex counts.
-pub(crate) struct Judgement {
+pub(crate) struct Judgement<'m> {
+    /// Vertices with several fans are marked.
+    marks: Option<&'m Marks>,
     pub(crate) used_vertices: u64,
     pub(crate) edges: u64,
     pub(crate) boundary_edges: u64,
@@ -37,9 +39,10 @@ pub(crate) fn spokes([next, previous]: Wedge) -> [Spoke; 2] {
     [u64::from(next) * 2, u64::from(previous) * 2 + 1]
 }
 
-impl Judgement {
-    pub(crate) fn new(unbalanced: Sequence<u32>) -> Self {
+impl<'m> Judgement<'m> {
+    pub(crate) fn new(unbalanced: Sequence<u32>, marks: Option<&'m Marks>) -> Self {
         Self {
+            marks,
             used_vertices: 0,
             edges: 0,
             boundary_edges: 0,
@@ -118,6 +121,9 @@ impl Judgement {
         if fans > 1 {
             self.nonmanifold_vertices += 1;
             self.vertex_places.offer(vertex, fans);
+            if let Some(marks) = self.marks {
+                marks.vertex(DefectKind::NonmanifoldVertex, vertex)?;
+            }
         }
         if balanced { Ok(()) } else { self.unbalanced.push(vertex) }
     }

@@ -118,7 +118,8 @@ pub fn prove<'s, E: Error + Send>(
     prove_marking(open, scratch, options, None, pool, monitor)
 }
 
-/// [`prove`], and marks all triangles of pairs that cross, overlap or touch.
+/// [`prove`], and marks all triangles of pairs that cross, overlap or touch, all that are degenerate,
+/// and all non-manifold vertices.
 ///
 /// # Errors
 /// As [`prove`].
@@ -137,7 +138,8 @@ pub fn prove_marking<'s, E: Error + Send>(
         wanted.then(|| Intersections::new(scratch, options.share_bytes, pool).marking(marks))
     };
     let mut intersections = asked();
-    let sound = prove_sound(&mut *start()?, scratch, options, intersections.as_mut(), monitor)?;
+    let pairs = intersections.as_mut();
+    let sound = prove_sound(&mut *start()?, scratch, options, marks, pairs, monitor)?;
     let proof = match sound {
         Some(mut proof) => {
             enter_intersections(intersections, &mut proof, pool, monitor)?;
@@ -146,7 +148,7 @@ pub fn prove_marking<'s, E: Error + Send>(
         None => {
             drop(intersections);
             let mut intersections = asked();
-            let mut prover = Prover::new(scratch, options, monitor);
+            let mut prover = Prover::new(scratch, options, marks, monitor);
             prover.read(&mut *start()?, intersections.as_mut())?;
             let mut found = Proof::default();
             enter_intersections(intersections, &mut found, pool, monitor)?;

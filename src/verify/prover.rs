@@ -1,7 +1,7 @@
 //! The order of the passes over the tape, and the division of the share among them.
 
 use crate::defect::{
-    BoundaryEdge, CoincidentVertices, Defect, EdgePlace, InconsistentEdge, InwardComponent,
+    BoundaryEdge, CoincidentVertices, Defect, EdgePlace, InconsistentEdge, InwardComponent, Marks,
     NonmanifoldEdge, NonmanifoldVertex, Smallest, VertexPlace,
 };
 use crate::mesh::MeshSource;
@@ -26,6 +26,7 @@ pub(crate) struct Prover<'p> {
     quarter_bytes: u64,
     outward: Outward,
     vertices: Vertices,
+    marks: Option<&'p Marks>,
     monitor: &'p dyn Monitor,
     tape: Tape,
     intake: Intake,
@@ -37,6 +38,7 @@ impl<'p> Prover<'p> {
     pub(crate) fn new(
         scratch: &'p Scratch,
         options: &ProofOptions,
+        marks: Option<&'p Marks>,
         monitor: &'p dyn Monitor,
     ) -> Self {
         let quarter_bytes = options.share_bytes / 4;
@@ -45,6 +47,7 @@ impl<'p> Prover<'p> {
             quarter_bytes,
             outward: options.outward,
             vertices: options.vertices,
+            marks,
             monitor,
             tape: Tape::new(scratch, quarter_bytes),
             intake: Intake::default(),
@@ -58,7 +61,8 @@ impl<'p> Prover<'p> {
         source: &mut S,
         intersections: Option<&mut Intersections<'_>>,
     ) -> Result<(), VerifyError<S::Error>> {
-        self.intake = read(source, &mut self.tape, self.vertices, intersections, self.monitor)?;
+        let Self { tape, vertices, marks, monitor, .. } = self;
+        self.intake = read(source, tape, (*vertices, *marks), intersections, *monitor)?;
         Ok(())
     }
 
@@ -73,7 +77,8 @@ impl<'p> Prover<'p> {
                 (numbered.vertices, numbered.space)
             }
         };
-        let judgement = judge_fans(&self.tape, space, scratch, 2 * self.quarter_bytes, monitor)?;
+        let share = (scratch, 2 * self.quarter_bytes);
+        let judgement = judge_fans(&self.tape, space, self.marks, share, monitor)?;
         self.enter_counts(vertices, &judgement);
         self.proof.places.append(&mut self.intake.nonfinite_places);
         self.enter_places(indexed, &judgement)?;

@@ -6,6 +6,7 @@
 //! Invariant:  a proof from here equals the one from the passes over the tape.
 //! Memory:     that of the window.
 
+use crate::defect::Marks;
 use crate::mesh::{MeshSource, TriangleBatch};
 use crate::monitor::Monitor;
 use crate::store::{Scratch, StoreError};
@@ -26,11 +27,12 @@ enum Windows {
     Positions(Window<PositionKey>),
 }
 
-/// Reads a mesh as long as it is sound.
+/// Reads a mesh as long as it is sound, and marks degenerate triangles.
 pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
     source: &mut S,
     scratch: &Scratch,
     options: &ProofOptions,
+    marks: Option<&Marks>,
     mut intersections: Option<&mut Intersections<'_>>,
     monitor: &dyn Monitor,
 ) -> Result<Option<Proof>, VerifyError<S::Error>> {
@@ -53,11 +55,12 @@ pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
         let goes_on = match windows {
             Windows::Numbers(window) => {
                 let numbers = batch.indices.iter().copied();
-                take(&mut intake, window, pairs, &batch, numbers, |number, _| number)?
+                take((&mut intake, marks), window, pairs, &batch, numbers, |number, _| number)?
             }
             Windows::Positions(window) => {
                 let keys = batch.corners.iter().map(|corners| corners.map(key_of));
-                take(&mut intake, window, pairs, &batch, keys, |_, arrival| arrival as u32)?
+                let number = |_, arrival: u64| arrival as u32;
+                take((&mut intake, marks), window, pairs, &batch, keys, number)?
             }
         };
         if !goes_on {
@@ -77,7 +80,7 @@ pub(crate) fn prove_sound<S: MeshSource + ?Sized>(
 
 /// Takes the triangles of a batch, whose corners have these names; `false` ends the attempt.
 fn take<N: Name>(
-    intake: &mut Intake,
+    (intake, marks): (&mut Intake, Option<&Marks>),
     window: &mut Window<N>,
     mut intersections: Option<&mut Intersections<'_>>,
     batch: &TriangleBatch,
@@ -91,6 +94,7 @@ fn take<N: Name>(
         let Some(cone) = intake.add(corners, ids) else {
             return Ok(false);
         };
+        intake.mark(triangle, marks)?;
         if let (Some(intersections), true) = (&mut intersections, cone.has_area) {
             intersections.add(triangle, ids, corners)?;
         }

@@ -340,8 +340,8 @@ fn a_sound_surface_has_the_same_proof_in_one_pass_and_from_the_tape() {
     for indexed in [true, false] {
         let source = || Memory { solid: &many, indexed, next: 0 };
         let at_once =
-            prove_sound(&mut source(), &scratch, &options, None, &Void).expect("no failure");
-        let mut prover = Prover::new(&scratch, &options, &Void);
+            prove_sound(&mut source(), &scratch, &options, None, None, &Void).expect("no failure");
+        let mut prover = Prover::new(&scratch, &options, None, &Void);
         prover.read(&mut source(), None).expect("no failure");
         let taped = prover.judge().expect("no failure");
         assert_eq!(taped.components, 4);
@@ -349,7 +349,10 @@ fn a_sound_surface_has_the_same_proof_in_one_pass_and_from_the_tape() {
     }
     let tight = ProofOptions { share_bytes: 64 << 10, ..options };
     let mut source = Memory { solid: &many, indexed: true, next: 0 };
-    assert_eq!(prove_sound(&mut source, &scratch, &tight, None, &Void).expect("no failure"), None);
+    assert_eq!(
+        prove_sound(&mut source, &scratch, &tight, None, None, &Void).expect("no failure"),
+        None
+    );
 }
 
 #[test]

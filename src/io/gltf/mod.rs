@@ -13,6 +13,7 @@ mod draco_tests;
 #[cfg(test)]
 mod hostile_tests;
 mod images;
+mod listed;
 mod load;
 mod materials;
 mod model;

@@ -12,6 +12,7 @@ use crate::io::error::IoError;
 use crate::io::gltf::buffers::Buffers;
 use crate::io::gltf::container::find_chunks;
 use crate::io::gltf::images;
+use crate::io::gltf::listed::Listed;
 use crate::io::gltf::load::load;
 use crate::io::gltf::materials;
 use crate::io::gltf::model::{MeshRecord, Model, NONE};
@@ -58,6 +59,7 @@ pub(crate) struct GltfReader {
     /// Nodes and copies so far: what vertices are numbered in.
     scope: u64,
     vertices: u64,
+    listed: Listed,
     polygons: u64,
     discarded: Discarded,
     /// Bytes of the JSON and of accessors in use.
@@ -90,6 +92,7 @@ impl GltfReader {
             unnamed_material: None,
             scope: 0,
             vertices: 0,
+            listed: Listed::new(scratch, share / 64),
             polygons: 0,
             discarded: Discarded::default(),
             counted_bytes,
@@ -105,11 +108,11 @@ impl GltfReader {
             let map = visit.map;
             let stream = Stream::open(&mut self.model, &mut self.buffers, number, map)?;
             match stream {
-                Some(stream) => self.begin(stream)?,
+                Some(stream) => self.begin(stream, (number, &map))?,
                 // The vertices of points and lines are in the file too.
                 None => match self.model.primitives.get(number)?.position {
                     NONE => {}
-                    position => drop(self.number_vertices(position)?),
+                    position => drop(self.number_vertices(position, (number, &map))?),
                 },
             }
             return Ok(true);
@@ -169,8 +172,12 @@ impl GltfReader {
         Ok(true)
     }
 
-    /// The number in the file of the first vertex of an accessor, at the present place.
-    fn number_vertices(&mut self, accessor: u32) -> Result<u32, IoError> {
+    /// The number in the file of the first vertex of an accessor, that a primitive has in this place.
+    fn number_vertices(
+        &mut self,
+        accessor: u32,
+        (primitive, map): (u64, &Affine),
+    ) -> Result<u32, IoError> {
         let mut record = self.model.accessor(accessor)?;
         if record.scope != self.scope {
             record.scope = self.scope;
@@ -180,13 +187,14 @@ impl GltfReader {
                 return Err(IoError::too_many(&self.model.path, "vertices", u32::MAX.into()));
             }
             self.model.accessors.set(accessor.into(), record)?;
+            self.listed.enter(primitive, map)?;
         }
         Ok(record.first_vertex)
     }
 
     /// Numbers the vertices of a primitive and counts its bytes.
-    fn begin(&mut self, mut stream: Stream) -> Result<(), IoError> {
-        stream.first_vertex = self.number_vertices(stream.accessors[0])?;
+    fn begin(&mut self, mut stream: Stream, placed: (u64, &Affine)) -> Result<(), IoError> {
+        stream.first_vertex = self.number_vertices(stream.accessors[0], placed)?;
         for (accessor, field) in stream.accessors.into_iter().zip(stream.fields()) {
             let Some(field) = field.filter(|_| accessor != NONE && !stream.is_packed) else {
                 continue;
@@ -353,5 +361,9 @@ impl MeshSource for GltfReader {
 
     fn vertex_count(&self) -> Option<u64> {
         Some(self.vertices)
+    }
+
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, IoError> {
+        self.listed.next(&mut self.model, &mut self.buffers, positions)
     }
 }

@@ -11,7 +11,7 @@ use crate::io::polygon::WHITE;
 use crate::mesh::TriangleBatch;
 use crate::mesh::{Affine, IDENTITY, apply, mirrors};
 
-const POSITIONS: Demand =
+pub(crate) const POSITIONS: Demand =
     Demand { what: "three numbers in an element", lanes: [3, 3], is_index: false, is_part: false };
 const UVS: Demand = Demand { what: "two numbers in an element", lanes: [2, 2], ..POSITIONS };
 const COLOURS: Demand = Demand {
@@ -47,6 +47,12 @@ pub(crate) struct Stream {
     pub(crate) is_packed: bool,
     /// Bytes that are counted while this is delivered.
     pub(crate) pending_bytes: u64,
+}
+
+/// Where a position is put; zeros keep their sign where nothing moves.
+#[inline]
+pub(crate) fn place(map: &Affine, position: [f64; 3]) -> [f64; 3] {
+    if *map == IDENTITY { position } else { apply(map, position) }
 }
 
 impl Stream {
@@ -161,11 +167,7 @@ impl Stream {
         let mut positions = [[0.0; 3]; 3];
         for (position, &corner) in positions.iter_mut().zip(&corners) {
             let [x, y, z, _] = self.position.get(model, buffers, corner.into())?;
-            *position = [x, y, z];
-            // Zeros keep their sign where nothing moves.
-            if self.map != IDENTITY {
-                *position = apply(&self.map, *position);
-            }
+            *position = place(&self.map, [x, y, z]);
         }
         batch.corners.push(positions);
         batch.indices.push(corners.map(|corner| self.first_vertex + corner));

@@ -9,6 +9,7 @@
 
 use crate::io::error::IoError;
 use crate::io::input::Input;
+use crate::io::listed::Listing;
 use crate::io::names::{Materials, Parts};
 use crate::io::obj::materials::Library;
 use crate::io::obj::statements::{CornerIndices, Statement, Vertex, read_texture, resolve};
@@ -25,6 +26,7 @@ pub(crate) struct ObjStreamReader {
     share_bytes: u64,
     vertices_known: bool,
     positions: Table<[f64; 3]>,
+    listing: Listing,
     textures: Table<[f32; 2]>,
     colours: Option<Table<[u8; 4]>>,
     has_objects: bool,
@@ -55,6 +57,7 @@ impl ObjStreamReader {
             share_bytes,
             vertices_known: false,
             positions: Table::new(scratch, share_bytes / 2),
+            listing: Listing::default(),
             textures: Table::new(scratch, share_bytes / 8),
             colours: None,
             has_objects: false,
@@ -253,5 +256,12 @@ impl MeshSource for ObjStreamReader {
 
     fn vertex_count(&self) -> Option<u64> {
         Some(self.positions.len())
+    }
+
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, IoError> {
+        if !self.vertices_known {
+            self.read_vertices()?;
+        }
+        self.listing.next(&mut self.positions, positions)
     }
 }

@@ -1,7 +1,8 @@
 //! Small OBJ files, parsed by `tobj`; the only home of that crate besides the materials.
 //!
 //! Declines whatever `tobj` does not read to the end without an error. Memory: about six times the
-//! size of the file, and at most what [`Normalised`] lets through; names in their share.
+//! size of the file, and at most what [`Normalised`] lets through; names in their share. A list of
+//! vertices is the streaming reader's.
 
 use std::path::PathBuf;
 
@@ -12,6 +13,7 @@ use crate::io::input::Input;
 use crate::io::names::{Materials, Parts};
 use crate::io::obj::materials::Library;
 use crate::io::obj::normalised::{Normalised, Scope, Seen};
+use crate::io::obj::stream_reader::ObjStreamReader;
 use crate::io::polygon::{Columns, Corner, Owner, PolygonCutter, WHITE, polygon_number};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
 use crate::mesh::{Discarded, Material, MeshSource, Part, TriangleBatch};
@@ -32,6 +34,14 @@ pub(crate) struct TobjReader {
     discarded: Discarded,
     parts: Parts,
     materials: Materials,
+    lister: Lister,
+}
+
+/// Who lists the vertices, those that no face has as well, once that is asked.
+enum Lister {
+    /// Nobody so far.
+    Asleep(Option<Input>, Scratch, ReadOptions),
+    Awake(Box<ObjStreamReader>),
 }
 
 /// What became of a file.
@@ -83,6 +93,7 @@ impl TobjReader {
             discarded: Discarded::default(),
             parts: Parts::new(scratch, names_share),
             materials: Materials::new(scratch, names_share),
+            lister: Lister::Asleep(Some(input), scratch.clone(), *options),
         })))
     }
 
@@ -173,5 +184,18 @@ impl MeshSource for TobjReader {
 
     fn vertex_count(&self) -> Option<u64> {
         Some(self.seen.vertices)
+    }
+
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, IoError> {
+        if let Lister::Asleep(input, scratch, options) = &mut self.lister
+            && let Some(input) = input.take()
+        {
+            let reader = ObjStreamReader::new(input, scratch, options);
+            self.lister = Lister::Awake(Box::new(reader));
+        }
+        match &mut self.lister {
+            Lister::Awake(reader) => reader.next_vertices(positions),
+            Lister::Asleep(..) => Ok(false),
+        }
     }
 }

@@ -6,6 +6,7 @@
 
 use crate::io::error::{IoError, shown};
 use crate::io::input::Input;
+use crate::io::listed::Listing;
 use crate::io::polygon::{Columns, Corner, Owner, PolygonCutter, checked_index, polygon_number};
 use crate::io::words::{Dialect, Words};
 use crate::io::{BATCH_TRIANGLES, ReadOptions};
@@ -45,6 +46,7 @@ pub(crate) struct OffReader {
     faces_read: u64,
     vertices_known: bool,
     positions: Table<[f64; 3]>,
+    listing: Listing,
     polygon: PolygonCutter,
     discarded: Discarded,
 }
@@ -76,6 +78,7 @@ impl OffReader {
             faces_read: 0,
             vertices_known: false,
             positions: Table::new(scratch, options.share_bytes / 2),
+            listing: Listing::default(),
             polygon: PolygonCutter::new(columns),
             discarded: Discarded::default(),
         })
@@ -153,6 +156,10 @@ impl MeshSource for OffReader {
 
     fn vertex_count(&self) -> Option<u64> {
         Some(self.positions.len())
+    }
+
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, IoError> {
+        self.listing.next(&mut self.positions, positions)
     }
 }
 

@@ -8,6 +8,7 @@
 
 use crate::io::error::IoError;
 use crate::io::input::Input;
+use crate::io::listed::Listing;
 use crate::io::ply::body::Body;
 use crate::io::ply::header::{Header, Kind, Property, Role, Scalar};
 use crate::io::ply::materials::{FaceMaterials, FaceSurface};
@@ -27,6 +28,7 @@ pub(crate) struct PlyReader {
     body: Body,
     vertices_known: bool,
     positions: Table<[f64; 3]>,
+    listing: Listing,
     colours: Option<Table<[u8; 4]>>,
     vertex_uvs: Option<Table<[f32; 2]>>,
     has_uvs: bool,
@@ -72,6 +74,7 @@ impl PlyReader {
             body,
             vertices_known: false,
             positions: Table::new(scratch, options.share_bytes / 2),
+            listing: Listing::default(),
             vertex_uvs: has_vertex_uvs.then(|| Table::new(scratch, uvs_share)),
             has_uvs,
             coordinates: Vec::new(),
@@ -382,5 +385,9 @@ impl MeshSource for PlyReader {
 
     fn vertex_count(&self) -> Option<u64> {
         Some(self.positions.len())
+    }
+
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, IoError> {
+        self.listing.next(&mut self.positions, positions)
     }
 }

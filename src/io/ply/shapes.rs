@@ -1,8 +1,9 @@
-//! Loose triangles or edges as PLY: each with vertices of its own, and the triangle that it is of.
+//! Loose triangles, edges or points as PLY: each with vertices of its own, and a number of the file
+//! that they come from.
 //!
 //! Binary, little-endian, `double` coordinates. Triangles are `face` elements, edges are `edge`
-//! elements with `vertex1` and `vertex2`, as viewers expect them; `triangle` numbers the triangles
-//! of the file that they come from, from 0. Memory: a block of shapes.
+//! elements with `vertex1` and `vertex2`, as viewers expect them, points are vertices alone;
+//! `triangle` or `vertex` numbers what they are of in the file, from 0. Memory: a block of shapes.
 
 use std::path::Path;
 
@@ -18,14 +19,14 @@ const BLOCK: usize = 1024;
 /// Viewers expect numbers of vertices as `int`.
 const MOST_VERTICES: u64 = i32::MAX as u64;
 
-/// A triangle, or an edge by its first two points; model units.
+/// A triangle, an edge by its first two points, or a point, the first; model units.
 #[derive(Clone, Copy, Debug, Pod, Zeroable)]
 #[repr(C)]
 pub struct LooseShape {
     /// Its corners.
     pub points: [[f64; 3]; 3],
-    /// The triangle of the file, from 0.
-    pub triangle: u64,
+    /// The triangle or vertex of the file, from 0.
+    pub number: u64,
 }
 
 /// What loose shapes are.
@@ -35,6 +36,10 @@ pub enum LooseKind {
     Edges,
     /// Triangles.
     Triangles,
+    /// Points of triangles, which are numbered by these.
+    Points,
+    /// Points that are numbered as vertices.
+    Vertices,
 }
 
 impl LooseKind {
@@ -42,7 +47,12 @@ impl LooseKind {
         match self {
             Self::Edges => 2,
             Self::Triangles => 3,
+            Self::Points | Self::Vertices => 1,
         }
+    }
+
+    fn is_points(self) -> bool {
+        self.corners() == 1
     }
 }
 
@@ -57,9 +67,21 @@ pub fn write_loose_shapes(
     shapes: &Sequence<LooseShape>,
     scratch: &Scratch,
 ) -> Result<(), IoError> {
+    write_within(MOST_VERTICES, path, comment, (kind, shapes), scratch)
+}
+
+/// [`write_loose_shapes`] with at most so many vertices.
+fn write_within(
+    limit: u64,
+    path: &Path,
+    comment: &str,
+    (kind, shapes): (LooseKind, &Sequence<LooseShape>),
+    scratch: &Scratch,
+) -> Result<(), IoError> {
     let corners = kind.corners();
-    if shapes.len() * corners as u64 > MOST_VERTICES {
-        return Err(IoError::too_many(path, "vertices of one kind of defect", MOST_VERTICES));
+    if shapes.len().saturating_mul(corners as u64) > limit {
+        let path = path.to_path_buf();
+        return Err(IoError::TooLarge { path, what: "vertices of loose shapes", limit });
     }
     let mut output = Output::create(path, scratch)?;
     output.write(head(comment, kind, shapes.len()).as_bytes())?;
@@ -67,12 +89,17 @@ pub fn write_loose_shapes(
     let mut at = 0;
     while at < shapes.len() {
         let block = shapes.block(at, BLOCK, &mut buffer)?;
-        for x in block.iter().flat_map(|shape| &shape.points[..corners]).flatten() {
-            output.write(&x.to_le_bytes())?;
+        for shape in block {
+            for x in shape.points[..corners].as_flattened() {
+                output.write(&x.to_le_bytes())?;
+            }
+            if kind.is_points() {
+                output.write(&(shape.number as u32).to_le_bytes())?;
+            }
         }
         at += block.len() as u64;
     }
-    at = 0;
+    at = if kind.is_points() { shapes.len() } else { 0 };
     while at < shapes.len() {
         let block = shapes.block(at, BLOCK, &mut buffer)?;
         for (number, shape) in (at..).zip(block) {
@@ -83,7 +110,7 @@ pub fn write_loose_shapes(
                 let vertex = (number * corners as u64 + corner) as u32;
                 output.write(&vertex.to_le_bytes())?;
             }
-            output.write(&(shape.triangle as u32).to_le_bytes())?;
+            output.write(&(shape.number as u32).to_le_bytes())?;
         }
         at += block.len() as u64;
     }
@@ -100,10 +127,44 @@ fn head(comment: &str, kind: LooseKind, count: u64) -> String {
         LooseKind::Triangles => {
             format!("element face {count}\nproperty list uchar int vertex_indices\n")
         }
+        LooseKind::Points | LooseKind::Vertices => String::new(),
     };
+    let number = if kind == LooseKind::Vertices { "vertex" } else { "triangle" };
     format!(
         "ply\nformat binary_little_endian 1.0\ncomment {comment}\nelement vertex {vertices}\n\
          property double x\nproperty double y\nproperty double z\n{element}\
-         property uint triangle\nend_header\n"
+         property uint {number}\nend_header\n"
     )
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn more_vertices_than_viewers_can_number_are_refused_before_a_file_is_there() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let path = folder.path().join("out.ply");
+        let mut shapes = Sequence::new(&scratch, 1 << 10);
+        for number in 0..5 {
+            let shape = LooseShape { points: [[number as f64; 3]; 3], number };
+            shapes.push(shape).expect("the scratch folder works");
+        }
+        for (kind, corners) in [
+            (LooseKind::Points, 1),
+            (LooseKind::Vertices, 1),
+            (LooseKind::Edges, 2),
+            (LooseKind::Triangles, 3),
+        ] {
+            let limit = 5 * corners;
+            let write = |limit| write_within(limit, &path, "five", (kind, &shapes), &scratch);
+            let refused = write(limit - 1).expect_err("one vertex too many");
+            let IoError::TooLarge { limit: told, .. } = &refused else { panic!("{refused}") };
+            assert_eq!(*told, limit - 1);
+            assert!(!path.exists());
+            write(limit).expect("as many as are allowed");
+            std::fs::remove_file(&path).expect("there");
+        }
+    }
 }

@@ -13,6 +13,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::io::error::{IoError, Place, shown};
 use crate::io::input::Input;
+use crate::io::listed::LISTED_POSITIONS;
 use crate::io::polygon::WHITE;
 use crate::io::threemf::archive::{Archive, Members};
 use crate::io::threemf::instances::{Instance, Totals, Walk};
@@ -46,6 +47,8 @@ pub(crate) struct ThreeMfReader {
     scene: Scene,
     placement: Placement,
     walk: Walk,
+    /// A second walk, over the vertices alone.
+    listing: Listing,
     /// What was walked over, where parts are by themselves.
     nodes: Table<Node>,
     totals: Totals,
@@ -72,6 +75,14 @@ struct Node {
 
 /// No parent.
 const NONE: u32 = u32::MAX;
+
+/// How far vertices have been listed.
+#[derive(Default)]
+struct Listing {
+    walk: Walk,
+    /// The object in its place, and the next of its vertices.
+    instance: Option<(Instance, u64)>,
+}
 
 /// The instance that is being delivered.
 struct Current {
@@ -101,6 +112,7 @@ impl ThreeMfReader {
             scene,
             placement: options.placement,
             walk: Walk::default(),
+            listing: Listing::default(),
             nodes: Table::new(scratch, options.share_bytes / 32),
             totals: Totals::default(),
             current: None,
@@ -365,6 +377,30 @@ impl MeshSource for ThreeMfReader {
             Placement::InScene => self.totals.vertices,
             Placement::ByItself => self.vertices,
         })
+    }
+
+    fn next_vertices(&mut self, positions: &mut Vec<[f64; 3]>) -> Result<bool, IoError> {
+        positions.clear();
+        // By themselves objects are numbered once, which a walk does not tell.
+        if self.placement == Placement::ByItself {
+            return Ok(false);
+        }
+        let Listing { walk, instance } = &mut self.listing;
+        while (positions.len() as u64) < LISTED_POSITIONS {
+            match instance {
+                Some((placed, next)) if *next < placed.object.vertices => {
+                    let vertex = placed.object.first_vertex + *next;
+                    let position = self.scene.vertices.get(vertex)?;
+                    positions.push(placed.transform.apply(position));
+                    *next += 1;
+                }
+                _ => match walk.next(&mut self.scene, &self.path)? {
+                    Some(placed) => *instance = Some((placed, 0)),
+                    None => break,
+                },
+            }
+        }
+        Ok(!positions.is_empty())
     }
 }
 
