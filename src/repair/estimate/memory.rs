@@ -12,7 +12,7 @@ use crate::repair::measuring::SAMPLES;
 use crate::repair::plan::{MemoryPlan, WINDOW_BYTES};
 
 /// The program, and what a worker holds while bricks pass.
-const BASE_BYTES: f64 = 11e6;
+const BASE_BYTES: f64 = 13e6;
 const THREAD_BYTES: f64 = 1.0e6;
 /// OBJ files up to 4 MiB are held whole, this many times.
 const WHOLE_FILE_BYTES: f64 = (4_u32 << 20) as f64;
