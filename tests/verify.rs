@@ -481,6 +481,10 @@ fn coloured_surfaces_show_what_was_lost_and_invented_and_where() {
             assert!(corner[2] <= 1.9 || red != 214, "{name}: {corner:?} {red}");
         }
     }
+    let entries = std::fs::read_dir(&out).expect("listable");
+    let mut names: Vec<_> = entries.map(|entry| entry.expect("listable").file_name()).collect();
+    names.sort();
+    assert_eq!(names, ["file.ply", "original.ply"], "nothing else is left");
     let again = export("again", &["--threads", "3", "--max-memory", "64MiB"]);
     for name in ["original.ply", "file.ply"] {
         let bytes = |folder: &Path| std::fs::read(folder.join(name)).expect("there");
@@ -498,4 +502,17 @@ fn an_export_never_replaces_what_is_compared() {
     assert_eq!(ended.code, Some(5), "{}", ended.stderr);
     assert!(ended.stderr.contains("choose another folder"), "{}", ended.stderr);
     assert_eq!(std::fs::read_to_string(pair.file()).expect("there"), obj(&cube));
+}
+
+#[test]
+fn an_export_without_anything_to_measure_says_so_and_leaves_no_file() {
+    let cube = cuboid([0.0; 3], [1.0; 3]);
+    let flat = [[[0.0; 3], [1.0, 0.0, 0.0], [2.0, 0.0, 0.0]]];
+    let pair = Pair::new(&flat, &cube);
+    let ended = program(&["file.obj", "--against", "original.obj", "--export", "out"], &pair);
+    assert_eq!(ended.code, Some(5), "{}", ended.stderr);
+    ended.assert_says_one_line();
+    assert!(ended.stderr.contains("has no area"), "{}", ended.stderr);
+    let out = pair.folder.path().join("out");
+    assert!(std::fs::read_dir(out).map_or(0, Iterator::count) == 0);
 }

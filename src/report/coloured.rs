@@ -12,7 +12,7 @@ use std::path::Path;
 
 use glam::DVec3;
 
-use crate::io::{Format, IoError, Sink, WriteOptions, create};
+use crate::io::{ASIDE, Format, IoError, Sink, WriteOptions, create};
 use crate::mesh::{Attributes, MeshSource, SinkTriangles, TriangleBatch, VertexValues};
 use crate::report::ReportError;
 use crate::report::image_staged::StagedFile;
@@ -58,8 +58,13 @@ pub fn write_coloured(
         corners: Vec::with_capacity(MOST_CORNERS),
         written: 0,
     };
-    colouring.write_all(&mut *source, scene)?;
-    colouring.sink.finish().map_err(of_output)?;
+    let written = colouring.write_all(&mut *source, scene);
+    let finished = written.and_then(|()| colouring.sink.finish().map_err(of_output));
+    // What waited until the header was known has a name.
+    for name in ASIDE {
+        measuring.scratch.remove(name).map_err(PreviewError::measure)?;
+    }
+    finished?;
     staged.put_in_place::<IoError>()?;
     Ok(true)
 }
