@@ -64,37 +64,37 @@ fn shapes(path: &Path) -> Vec<(Vec<[f64; 3]>, u32)> {
         Some(line.parse().expect("a count"))
     };
     let vertices = count("vertex").expect("vertices");
-    if count("edge").or(count("face")).is_none() {
-        let record = |vertex: usize| {
-            let from = at + 28 * vertex;
-            let x = |axis: usize| {
-                let from = from + 8 * axis;
-                f64::from_le_bytes(bytes[from..from + 8].try_into().expect("eight"))
-            };
-            let number = bytes[from + 24..from + 28].try_into().expect("four");
-            (vec![[x(0), x(1), x(2)]], u32::from_le_bytes(number))
-        };
-        assert_eq!(bytes.len(), at + 28 * vertices);
-        return (0..vertices).map(record).collect();
-    }
-    let (corners, lead) = if count("edge").is_some() { (2, 0) } else { (3, 1) };
-    let number = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four"));
+    let word = |at: usize| u32::from_le_bytes(bytes[at..at + 4].try_into().expect("four"));
+    // The number of a face stands with it, all others with vertices.
+    let (corners, is_face) = match (count("edge"), count("face")) {
+        (Some(_), _) => (2, false),
+        (_, Some(_)) => (3, true),
+        _ => (1, false),
+    };
+    let vertex_bytes = if is_face { 24 } else { 28 };
     let position = |vertex: usize, axis: usize| {
-        let from = at + 24 * vertex + 8 * axis;
+        assert!(vertex < vertices);
+        let from = at + vertex_bytes * vertex + 8 * axis;
         f64::from_le_bytes(bytes[from..from + 8].try_into().expect("eight"))
     };
-    let elements = count("edge").or(count("face")).expect("elements");
-    let record = lead + 4 * corners + 4;
-    assert_eq!(bytes.len(), at + 24 * vertices + record * elements);
+    let record = if is_face { 17 } else { 4 * corners };
+    let (elements, record) = match count("edge").or(count("face")) {
+        Some(elements) => (elements, record),
+        None => (vertices, 0),
+    };
+    assert_eq!(bytes.len(), at + vertex_bytes * vertices + record * elements);
     let shape = |element: usize| {
-        let from = at + 24 * vertices + record * element;
-        assert!(lead == 0 || bytes[from] == 3);
-        let points = (0..corners).map(|corner| {
-            let vertex = number(from + lead + 4 * corner) as usize;
-            assert!(vertex < vertices);
-            std::array::from_fn(|axis| position(vertex, axis))
-        });
-        (points.collect(), number(from + record - 4))
+        let from = at + vertex_bytes * vertices + record * element + usize::from(is_face);
+        assert!(!is_face || bytes[from - 1] == 3);
+        let vertex = |corner: usize| match record {
+            0 => element,
+            _ => word(from + 4 * corner) as usize,
+        };
+        let points =
+            (0..corners).map(|corner| std::array::from_fn(|axis| position(vertex(corner), axis)));
+        let number = |vertex: usize| word(at + vertex_bytes * vertex + 24);
+        let number = if is_face { word(from + 12) } else { number(vertex(0)) };
+        (points.collect(), number)
     };
     (0..elements).map(shape).collect()
 }

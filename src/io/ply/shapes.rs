@@ -2,8 +2,10 @@
 //! that they come from.
 //!
 //! Binary, little-endian, `double` coordinates. Triangles are `face` elements, edges are `edge`
-//! elements with `vertex1` and `vertex2`, as viewers expect them, points are vertices alone;
-//! `triangle` or `vertex` numbers what they are of in the file, from 0. Memory: a block of shapes.
+//! elements with `vertex1` and `vertex2`, as viewers expect them, points are vertices alone.
+//! `triangle` or `vertex` numbers what they are of in the file, from 0; it stands with the faces, and
+//! of edges and points with the vertices, as some readers take an edge for all of its numbers.
+//! Memory: a block of shapes.
 
 use std::path::Path;
 
@@ -51,8 +53,9 @@ impl LooseKind {
         }
     }
 
-    fn is_points(self) -> bool {
-        self.corners() == 1
+    /// Whether numbers stand with the vertices.
+    fn numbers_vertices(self) -> bool {
+        self != Self::Triangles
     }
 }
 
@@ -90,16 +93,18 @@ fn write_within(
     while at < shapes.len() {
         let block = shapes.block(at, BLOCK, &mut buffer)?;
         for shape in block {
-            for x in shape.points[..corners].as_flattened() {
-                output.write(&x.to_le_bytes())?;
-            }
-            if kind.is_points() {
-                output.write(&(shape.number as u32).to_le_bytes())?;
+            for point in &shape.points[..corners] {
+                for x in point {
+                    output.write(&x.to_le_bytes())?;
+                }
+                if kind.numbers_vertices() {
+                    output.write(&(shape.number as u32).to_le_bytes())?;
+                }
             }
         }
         at += block.len() as u64;
     }
-    at = if kind.is_points() { shapes.len() } else { 0 };
+    at = if corners == 1 { shapes.len() } else { 0 };
     while at < shapes.len() {
         let block = shapes.block(at, BLOCK, &mut buffer)?;
         for (number, shape) in (at..).zip(block) {
@@ -110,7 +115,9 @@ fn write_within(
                 let vertex = (number * corners as u64 + corner) as u32;
                 output.write(&vertex.to_le_bytes())?;
             }
-            output.write(&(shape.number as u32).to_le_bytes())?;
+            if !kind.numbers_vertices() {
+                output.write(&(shape.number as u32).to_le_bytes())?;
+            }
         }
         at += block.len() as u64;
     }
@@ -129,11 +136,18 @@ fn head(comment: &str, kind: LooseKind, count: u64) -> String {
         }
         LooseKind::Points | LooseKind::Vertices => String::new(),
     };
-    let number = if kind == LooseKind::Vertices { "vertex" } else { "triangle" };
+    let number = match kind {
+        LooseKind::Vertices => "property uint vertex\n",
+        _ => "property uint triangle\n",
+    };
+    let [with_vertices, with_elements] = match kind.numbers_vertices() {
+        true => [number, ""],
+        false => ["", number],
+    };
     format!(
         "ply\nformat binary_little_endian 1.0\ncomment {comment}\nelement vertex {vertices}\n\
-         property double x\nproperty double y\nproperty double z\n{element}\
-         property uint {number}\nend_header\n"
+         property double x\nproperty double y\nproperty double z\n{with_vertices}{element}\
+         {with_elements}end_header\n"
     )
 }
 
