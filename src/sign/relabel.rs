@@ -95,20 +95,23 @@ impl Workspace {
         }
         self.parity.from_marks(&self.loaded.marks, item.base_inside);
         self.set_signs(&regions, item, rule)?;
-        self.marks.set_differences(&self.signs);
+        let flips = &item.load.flips;
         let cell_units = f64::from(domain.cell_units);
-        let tip_corners = self.take_off_tips(record, &item.load.flips, cell_units);
-        let mut stats = self.count();
-        stats.tip_corners = tip_corners;
-        let mut brick = self.pick_crossings(record, &item.load.flips, &mut stats);
+        let (mut brick, mut stats) = self.cross(record, flips, cell_units);
+        let tips = apart(&self.signs, &find_tips(&self.signs), &brick.walls);
+        if !tips.is_empty() {
+            for [x, y, z] in &tips {
+                self.signs.rows[z * LINES + y] &= !(1 << x);
+            }
+            (brick, stats) = self.cross(record, flips, cell_units);
+        }
+        stats.tip_corners = tips.len() as u64;
         if let Some(borders) = borders
             && let Some(number) = borders.find(item.load.brick.0)
         {
             let view = borders.view(number)?;
             brick.borders.extend(decode_borders(&view)?.borders.iter().map(Border::from));
         }
-        brick.walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
-        stats.walled_faces = brick.walls.len() as u64;
         stats.bricks = u64::from(!brick.crossings.is_empty());
         let bytes = encode(&brick);
         Ok(Relabelled { key: item.load.brick.0, bytes, stats })
@@ -144,26 +147,19 @@ impl Workspace {
         Ok(())
     }
 
-    /// Takes off the tips that no walled faces hold; how many corners that were.
-    fn take_off_tips(
+    /// Marks, crossings and walled faces of the signs as they are.
+    fn cross(
         &mut self,
         record: Option<&ArchivedHitBrick>,
         flips: &[FlipRecord],
         cell_units: f64,
-    ) -> u64 {
-        let tips = find_tips(&self.signs);
-        if tips.is_empty() {
-            return 0;
-        }
-        // The walls as they are with all tips on.
-        let brick = self.pick_crossings(record, flips, &mut SignStats::default());
-        let walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
-        let tips = apart(&self.signs, &tips, &walls);
-        for [x, y, z] in &tips {
-            self.signs.rows[z * LINES + y] &= !(1 << x);
-        }
+    ) -> (SignBrick, SignStats) {
         self.marks.set_differences(&self.signs);
-        tips.len() as u64
+        let mut stats = self.count();
+        let mut brick = self.pick_crossings(record, flips, &mut stats);
+        brick.walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
+        stats.walled_faces = brick.walls.len() as u64;
+        (brick, stats)
     }
 
     /// Counts corners that the brick owns, and leaf cells.

@@ -10,6 +10,7 @@
 //!             bricks stays.
 
 use crate::octree::{CornerBits, LINES, SIDE, face_index};
+use crate::store::Parts;
 
 /// Corners that lie within the brick.
 const WITHIN: u64 = ((1 << SIDE) - 1) & !1;
@@ -51,25 +52,25 @@ pub fn apart(signs: &CornerBits, tips: &[[usize; 3]], walls: &[u32]) -> Vec<[usi
         let [x, y, z] = corner;
         tips.binary_search_by_key(&[z, y, x], |[x, y, z]| [*z, *y, *x]).ok()
     };
-    let mut piece_of: Vec<usize> = (0..tips.len()).collect();
+    let mut pieces = Parts::new(tips.len());
     let mut is_held = vec![false; tips.len()];
     for (tip, corner) in tips.iter().enumerate() {
         for beyond in across_walls(signs, walls, *corner) {
             match number_of(beyond) {
-                Some(other) => unite(&mut piece_of, tip, other),
+                Some(other) => drop(pieces.unite(tip, other)),
                 None => is_held[tip] = true,
             }
         }
     }
-    let roots: Vec<usize> = (0..tips.len()).map(|tip| root(&piece_of, tip)).collect();
+    let firsts = pieces.firsts();
     let mut corners = vec![0; tips.len()];
     let mut holds = vec![false; tips.len()];
-    for (tip, &root) in roots.iter().enumerate() {
-        corners[root] += 1;
-        holds[root] |= is_held[tip];
+    for (&first, is_held) in firsts.iter().zip(is_held) {
+        corners[first] += 1;
+        holds[first] |= is_held;
     }
-    let is_apart = |root: usize| !holds[root] && corners[root] <= SPECK_CORNERS;
-    let apart = tips.iter().zip(&roots).filter(|(_, root)| is_apart(**root));
+    let is_apart = |first: usize| !holds[first] && corners[first] <= SPECK_CORNERS;
+    let apart = tips.iter().zip(firsts).filter(|(_, first)| is_apart(**first));
     apart.map(|(tip, _)| *tip).collect()
 }
 
@@ -109,18 +110,6 @@ fn across_walls<'a>(
     })
 }
 
-fn root(piece_of: &[usize], mut tip: usize) -> usize {
-    while piece_of[tip] != tip {
-        tip = piece_of[tip];
-    }
-    tip
-}
-
-fn unite(piece_of: &mut [usize], a: usize, b: usize) {
-    let (a, b) = (root(piece_of, a), root(piece_of, b));
-    piece_of[a.max(b)] = a.min(b);
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -140,14 +129,6 @@ mod tests {
         assert_eq!(find_tips(&signs), [[1, 4, 4], [4, 6, 5], [10, SIDE - 1, 20]]);
     }
 
-    /// The walls between three corners that lie across from each other in the cell at `at`.
-    fn walls_of_three(at: [usize; 3]) -> Vec<u32> {
-        // Its max corners on two axes each: with the min corner no face of theirs has an edge inside.
-        let mut walls = (0..3).map(|axis| face_index(axis, at)).collect::<Vec<_>>();
-        walls.sort_unstable();
-        walls
-    }
-
     #[test]
     fn a_tip_is_apart_unless_walls_hold_it() {
         let mut signs = CornerBits::default();
@@ -155,7 +136,7 @@ mod tests {
         assert_eq!(apart(&signs, &tips, &[]), tips);
         // On a neck, and then where what lies across three faces hangs together.
         assert_eq!(apart(&signs, &tips, &[face_index(2, [5, 5, 5])]), tips);
-        let walls = walls_of_three([5, 5, 5]);
+        let walls = [0, 1, 2].map(|axis| face_index(axis, [5, 5, 5]));
         assert_eq!(apart(&signs, &tips, &walls), tips);
         signs.rows[6 * LINES + 6] |= 1 << 6;
         assert_eq!(apart(&signs, &tips, &walls), [[20, 20, 20]]);
