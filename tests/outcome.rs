@@ -8,7 +8,7 @@ use crate::support::schema::check_document;
 use crate::support::{repair_at, testdata};
 
 /// Fields that only some outcomes have; their documentation says when.
-const CONDITIONAL: [&str; 52] = [
+const CONDITIONAL: [&str; 55] = [
     "part.number",
     "part.name",
     "part.places",
@@ -49,6 +49,9 @@ const CONDITIONAL: [&str; 52] = [
     "patch.largest[].odd_faces",
     "patch.largest[].lo_cell",
     "patch.largest[].hi_cell",
+    "deviation.creases.largest.distance",
+    "deviation.creases.largest.nearest",
+    "deviation.creases.largest.position",
     "settings.decimate.cells",
     "settings.decimate.length",
     "output.proof.places[].kind",

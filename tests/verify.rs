@@ -121,6 +121,10 @@ fn clean_repairs_pass() {
         assert_eq!((measured.lost.share, measured.invented_share), (0.0, 0.0), "{number}");
         let largest = measured.file_to_original.in_cells.expect("cells are known")[3];
         assert!(largest < 1.0, "{number}: {largest} cells");
+        let kept = measured.creases.expect("they are followed").kept_share;
+        // Facets of what is round meet at less than 30 degrees.
+        assert!(kept.is_none_or(|kept| kept > 0.98), "{number}: {kept:?}");
+        assert_eq!(kept.is_some(), number >= 2, "{number}");
         std::fs::rename(&output, pair.file()).expect("beside it");
         let found = pair.verified(&limits);
         assert_eq!(found.verdict, Verdict::Pass, "{number}: {}", reasons(&found));

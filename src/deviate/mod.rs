@@ -10,7 +10,7 @@
 //! Units:      model units, the same in both files; angles in degrees.
 //! Memory:     about half of the share for each surface while it is read, half for both together
 //!             while they are compared; beyond that, scratch files without names: 96 bytes a
-//!             triangle, and 264 more while sharp edges are sought.
+//!             triangle, and 72 more while sharp edges are sought.
 //! Fails:      [`DeviateError`]: a source, the scratch disk, or a request to stop. Surfaces that
 //!             have no area, or are too large for their squares, give no deviation.
 //! Source:     Cignoni, Rocchini, Scopigno 1998, Metro (distances by samples); Roussopoulos, Kelley,
@@ -20,6 +20,7 @@
 mod compare;
 mod creases;
 mod deviation;
+mod edges;
 mod error;
 mod nearest;
 mod pages;

@@ -2,7 +2,8 @@
 //!
 //! Memory: half of the share while it is read, a quarter as it stays.
 
-use crate::deviate::creases::{Creases, find_creases};
+use crate::deviate::creases::Creases;
+use crate::deviate::edges::find_creases;
 use crate::deviate::reading::{BLOCK, Tape, read};
 use crate::deviate::samples::{Sample, take_samples};
 use crate::deviate::tree::{Tree, TreeBuilder};

@@ -19,6 +19,8 @@ use crate::store::{FileState, Resources, Spool, SpoolReader, StoreError};
 
 /// Samples of each surface: a share of a twentieth is told within a hundredth.
 pub const SAMPLES: u64 = 4000;
+/// Samples of the sharp edges of the input.
+const CREASE_SAMPLES: u64 = 400;
 /// How far from the input the surface may lie by contouring, cells.
 const CONTOUR_CELLS: f64 = 1.0;
 /// The tolerance is at least so much more, cells: half of a wall of default thickness.
@@ -64,7 +66,7 @@ impl Run<'_> {
         let Resources { scratch, pool, monitor, .. } = *resources;
         let means = Means { scratch, pool, share_bytes: resources.share_bytes / 4 * 3, monitor };
         // Contouring writes neighbours after each other, and models list them so as a rule.
-        let asked = SurfaceOptions { samples: SAMPLES, creases: false, is_coherent: true };
+        let asked = SurfaceOptions { samples: SAMPLES, creases: true, is_coherent: true };
         let soup = Spool::open(scratch, soup)?;
         let mut soup = SoupSource::new(&soup);
         let before =
@@ -88,7 +90,7 @@ impl Run<'_> {
         let merged = self.contour_options(findings).merged_cells();
         let cell = domain.cell_size();
         DeviationOptions {
-            crease_samples: 0,
+            crease_samples: CREASE_SAMPLES,
             tolerance: (CONTOUR_CELLS + wall + merged) * cell,
             cell_size: Some(cell),
         }

@@ -92,6 +92,9 @@ pub const CELL_TRIANGLE_BYTES: f64 = 60.0;
 const MEASURED_BYTES: f64 = 80.0;
 const MEASURED_SORT_BYTES: f64 = 96.0;
 const BOX_BYTES: f64 = 48.0 / 7.0;
+/// The edges of a triangle while sharp ones are sought, and all of them sharp.
+const MEASURED_EDGES_BYTES: f64 = 3.0 * 24.0;
+const MEASURED_CREASES_BYTES: f64 = 1.5 * 96.0;
 /// Samples and corners of a surface, sorted and in order, and their distances.
 const MEASURED_SAMPLES_BYTES: f64 = 2.0 * SAMPLES as f64 * (2.0 * 112.0 + 16.0);
 /// A vertex under way takes so much of the proof's memory, growth included.
@@ -435,7 +438,12 @@ impl DiskModel<'_> {
             false => 0.0,
         };
         let samples = 2.0 * spilled(MEASURED_SAMPLES_BYTES, 0.0, share / 16.0);
-        2.0 * read(triangles) + sorted + read(most.triangles as f64) + positions + samples
+        let written = most.triangles as f64;
+        let creases = |count: f64| spilled(MEASURED_CREASES_BYTES * count, 0.0, share / 16.0);
+        let order = ORDER_BYTES / MEASURED_EDGES_BYTES;
+        let edges = spilled(MEASURED_EDGES_BYTES * triangles.max(written), order, share / 8.0);
+        let creases = creases(triangles) + creases(written) + edges;
+        2.0 * read(triangles) + sorted + read(written) + positions + samples + creases
     }
 
     /// What the proof and the reader of the written file spill.

@@ -41,6 +41,8 @@ const MOST_JOINED: f64 = 16_384.0;
 /// their distances.
 const MEASURED_BYTES: f64 = 90.0;
 const MEASURED_SORT_BYTES: f64 = 220.0;
+/// Its edges, while sharp ones are sought.
+const MEASURED_EDGES_BYTES: f64 = 72.0;
 const SAMPLES_BYTES: f64 = 4.0 * SAMPLES as f64 * 300.0;
 /// What an allocator keeps of the lists of early steps; larger ones go back at once.
 const RETAINED_BYTES: f64 = (32_u32 << 20) as f64;
@@ -116,7 +118,9 @@ impl MemoryModel<'_> {
         let written = GROWTH * MEASURED_BYTES * self.counts.at_most.triangles as f64;
         let read = GROWTH * MEASURED_SORT_BYTES * self.sums.finite_triangles() as f64;
         let positions = POSITION_BYTES * self.counts.at_most.vertices as f64;
+        let edges = GROWTH * MEASURED_EDGES_BYTES * (self.counts.at_most.triangles as f64);
         written.min(share / 7.0)
+            + edges.min(share / 6.0)
             + read.min(share / 3.0)
             + positions.min(share / 6.0)
             + SAMPLES_BYTES

@@ -22,7 +22,7 @@ const PER_CROSSING_SIGNED: f64 = 80.0;
 const PER_BRICK: f64 = 60_000.0;
 const PER_CROSSING_PLACED: f64 = 1400.0;
 const PER_TRIANGLE_PROVED: f64 = 600.0;
-const PER_TRIANGLE_MEASURED: f64 = 350.0;
+const PER_TRIANGLE_MEASURED: f64 = 500.0;
 /// Share of a stage that more threads make shorter.
 const PARALLEL: [(Stage, f64); 8] = [
     (Stage::Ingest, 0.5),
