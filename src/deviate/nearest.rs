@@ -55,6 +55,17 @@ pub(crate) fn near_on(
     })
 }
 
+/// What a search within a reach ends with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Within {
+    /// A triangle settled the question.
+    Settled,
+    /// There are triangles, and none of those that were asked settled it.
+    Open,
+    /// Nothing is within the reach.
+    Nothing,
+}
+
 /// A walker of one tree; each worker has its own.
 pub(crate) struct Walker<'t> {
     triangles: Pages<'t, Triangle>,
@@ -114,6 +125,60 @@ impl<'t> Walker<'t> {
         }
         self.last = best.map(|best| best.triangle);
         Ok(best)
+    }
+
+    /// Looks for what is within `reach` of `point`, nearer and nearer, until a triangle `settles` the
+    /// question.
+    pub(crate) fn within(
+        &mut self,
+        point: DVec3,
+        reach: f64,
+        settles: impl Fn(&Triangle) -> bool,
+    ) -> Result<Within, StoreError> {
+        let mut bound_squared = reach * reach;
+        let mut nearest = None;
+        let mut is_settled = |triangle: &Triangle, bound_squared: &mut f64| {
+            let closest = closest_on_triangle(point, triangle.points());
+            let distance_squared = point.distance_squared(closest);
+            if distance_squared > *bound_squared {
+                return false;
+            }
+            *bound_squared = distance_squared;
+            nearest = Some(*triangle);
+            settles(triangle)
+        };
+        let mut found = self.last.is_some_and(|last| is_settled(&last, &mut bound_squared));
+        self.start();
+        while !found && let Some((bound, level, node)) = self.stack.pop() {
+            if bound > bound_squared {
+                continue;
+            }
+            if level == 0 {
+                let mut triangles = self.triangles.group(node * GROUP)?.iter();
+                found = triangles.any(|triangle| is_settled(triangle, &mut bound_squared));
+                continue;
+            }
+            let from = self.stack.len();
+            for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
+            {
+                let bound = bounds.distance_squared(point);
+                if bound <= bound_squared {
+                    self.stack.push((bound, level - 1, child));
+                }
+            }
+            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        self.last = nearest;
+        Ok(match nearest {
+            _ if found => Within::Settled,
+            Some(_) => Within::Open,
+            None => Within::Nothing,
+        })
+    }
+
+    /// Forgets what the last point had nearest: then an answer depends on the tree and the point.
+    pub(crate) fn forget(&mut self) {
+        self.last = None;
     }
 
     /// A triangle that the ray meets and light does not pass, whichever is found first.

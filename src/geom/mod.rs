@@ -3,6 +3,7 @@
 mod closest;
 pub mod crossing;
 mod ear_clipping;
+mod halving;
 mod mix;
 pub mod morton;
 pub mod orientation;
@@ -15,4 +16,5 @@ mod wide;
 
 pub use closest::closest_on_triangle;
 pub use ear_clipping::EarClipper;
+pub use halving::{ball_around, halve, longest_edge, rejoin};
 pub use mix::mix;
