@@ -150,8 +150,7 @@ mod tests {
     fn join_all(pieces: &[Piece]) -> Vec<Piece> {
         let mut pieces = pieces.to_vec();
         loop {
-            let pair = (1..pieces.len())
-                .find_map(|i| Some((i, pieces[i - 1].joined(&pieces[i])?)));
+            let pair = (1..pieces.len()).find_map(|i| Some((i, pieces[i - 1].joined(&pieces[i])?)));
             let Some((i, joined)) = pair else { return pieces };
             pieces.splice(i - 1..=i, [joined]);
         }
