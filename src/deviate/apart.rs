@@ -23,7 +23,8 @@ use crate::geom::{ball_around, closest_on_triangle, longest_edge};
 use crate::mesh::{MeshSource, TriangleBatch};
 use crate::store::{Scales, StoreError, ordered_by_weight};
 
-/// Items are cut before they go to a worker, until they can have no more pieces than about this.
+/// A triangle that may have more pieces than about this is cut before it goes to a worker, unless all
+/// of it is near or far.
 const MOST_PIECES: f64 = 4096.0;
 /// Triangles of an item.
 const CHUNK: usize = 256;
@@ -63,8 +64,10 @@ impl Target {
     where
         S::Error: Send,
     {
-        let threads = means.pool.current_num_threads() as u64;
-        let mut items = Items::new(source, gap);
+        // One more for the thread that makes items.
+        let judges = means.pool.current_num_threads() as u64 + 1;
+        let judge = || Judge::new(self, gap, means.share_bytes / 8 / judges);
+        let mut items = Items::new(source, judge());
         let mut joiner = Joiner::default();
         let mut pieces = Vec::new();
         ordered_by_weight(
@@ -74,7 +77,7 @@ impl Target {
                 means.stop_if_asked()?;
                 items.next(means)
             },
-            || Judge::new(self, gap, means.share_bytes / 8 / threads),
+            judge,
             |judge, item| Ok(judge.far_pieces(item.pieces)?),
             |found: Vec<Piece>| {
                 for piece in found {
@@ -102,9 +105,9 @@ struct Item {
 }
 
 /// Makes items of what a source delivers.
-struct Items<'s, S: MeshSource + ?Sized> {
+struct Items<'s, 't, S: MeshSource + ?Sized> {
     source: &'s mut S,
-    finest: f64,
+    judge: Judge<'t>,
     batch: TriangleBatch,
     /// How many triangles of the batch are done, and of the source before it.
     at: usize,
@@ -113,35 +116,34 @@ struct Items<'s, S: MeshSource + ?Sized> {
     cut: Vec<Piece>,
 }
 
-impl<'s, S: MeshSource + ?Sized> Items<'s, S> {
-    fn new(source: &'s mut S, gap: &Gap) -> Self {
+impl<'s, 't, S: MeshSource + ?Sized> Items<'s, 't, S> {
+    fn new(source: &'s mut S, judge: Judge<'t>) -> Self {
         let (batch, cut) = (TriangleBatch::default(), Vec::new());
-        Self { source, finest: gap.finest, batch, at: 0, before: 0, cut }
-    }
-
-    /// About how many pieces that are not halved any more this one may have.
-    fn most_pieces(&self, piece: &Piece) -> f64 {
-        let (_, longest_squared) = longest_edge(&piece.points());
-        let edges = longest_squared / (self.finest * self.finest);
-        if edges <= 1.0 { 1.0 } else { 4.0 * edges }
+        Self { source, judge, batch, at: 0, before: 0, cut }
     }
 
     fn next(&mut self, means: &Means<'_>) -> Result<Option<Item>, DeviateError<S::Error>> {
         let (mut pieces, mut many) = (Vec::new(), 0.0);
         while pieces.len() < CHUNK {
             let Some(piece) = self.piece(means)? else { break };
-            let more = self.most_pieces(&piece);
+            let mut more = self.judge.most_pieces(&piece);
+            if more > MOST_PIECES {
+                means.stop_if_asked()?;
+                match (self.judge.verdict(&piece.points(), false)?, piece.halves()) {
+                    (Verdict::Near, _) => continue,
+                    (Verdict::Mixed, Some([first, second])) => {
+                        self.cut.extend([second, first]);
+                        continue;
+                    }
+                    (Verdict::Far | Verdict::Mixed, _) => more = 1.0,
+                }
+            }
             if !pieces.is_empty() && many + more > MOST_PIECES {
                 self.cut.push(piece);
                 break;
             }
-            match piece.halves() {
-                Some([first, second]) if more > MOST_PIECES => self.cut.extend([second, first]),
-                _ => {
-                    pieces.push(piece);
-                    many += more;
-                }
-            }
+            pieces.push(piece);
+            many += more;
         }
         let weight_bytes = (many * size_of::<Piece>() as f64) as u64;
         Ok((!pieces.is_empty()).then_some(Item { pieces, weight_bytes }))
@@ -184,6 +186,13 @@ impl<'t> Judge<'t> {
     fn new(target: &'t Target, gap: &Gap, share_bytes: u64) -> Self {
         let slack = target.reach * SLACK;
         Self { walker: Walker::new(&target.tree, share_bytes), gap: *gap, slack }
+    }
+
+    /// About how many pieces that are not halved any more this one may have.
+    fn most_pieces(&self, piece: &Piece) -> f64 {
+        let (_, longest_squared) = longest_edge(&piece.points());
+        let edges = longest_squared / (self.gap.finest * self.gap.finest);
+        if edges <= 1.0 { 1.0 } else { 4.0 * edges }
     }
 
     /// What of some pieces is far, joined as far as that goes.
