@@ -40,28 +40,39 @@ pub(crate) struct Wanted<'w> {
 impl Wanted<'_> {
     /// Makes the folder, and refuses what cannot be before the work begins.
     pub(crate) fn prepare(&self) -> Result<(), LayersError> {
-        self.run(1, |layers| layers.prepare()).unwrap_or(Ok(()))
+        // Other folders may not be there yet.
+        let folder = self.output.parent().filter(|folder| !folder.as_os_str().is_empty());
+        let folder = folder.unwrap_or(Path::new("."));
+        self.run((folder, 1), |layers| layers.prepare()).unwrap_or(Ok(()))
     }
 
     /// Takes away the layers of an earlier run.
     pub(crate) fn clear(&self) -> Result<(), LayersError> {
-        self.run(1, |layers| layers.clear()).unwrap_or(Ok(()))
+        self.run((self.scratch_folder(), 1), |layers| layers.clear()).unwrap_or(Ok(()))
     }
 
     /// Writes the layers, if they are wanted, and notes them in the outcome.
     pub(crate) fn write(&self, outcome: &mut Outcome) -> Result<(), LayersError> {
-        let threads = outcome.memory.threads;
-        let written = self.run(threads, |layers| layers.write(outcome)).transpose()?;
+        let means = (self.scratch_folder(), outcome.memory.threads);
+        let written = self.run(means, |layers| layers.write(outcome)).transpose()?;
         outcome.exports = written;
         Ok(())
     }
 
+    fn scratch_folder(&self) -> &Path {
+        let folders = [&self.limits.work_dir, &self.arguments.export];
+        folders.into_iter().flatten().next().map_or(Path::new("."), PathBuf::as_path)
+    }
+
     /// A sixth of the memory budget is for measuring, as much for a reader.
-    fn run<T>(&self, threads: usize, work: impl FnOnce(&Layers) -> T) -> Option<T> {
+    fn run<T>(
+        &self,
+        (scratch_folder, threads): (&Path, usize),
+        work: impl FnOnce(&Layers) -> T,
+    ) -> Option<T> {
         let folder = self.arguments.export.as_deref()?;
-        let work_dir = self.limits.work_dir.as_deref().unwrap_or(folder);
         let limit_bytes = self.limits.max_disk_bytes.unwrap_or(u64::MAX);
-        let scratch = Scratch::limited(work_dir, limit_bytes);
+        let scratch = Scratch::limited(scratch_folder, limit_bytes);
         let Self { input, output, settings, monitor, .. } = *self;
         Some(work(&Layers {
             folder,

@@ -43,7 +43,7 @@ pub enum LayersError {
         /// The input or the output.
         path: PathBuf,
         /// The reader's word.
-        source: IoError,
+        source: Box<IoError>,
     },
     /// A layer cannot be written.
     #[error("Cannot write {path}")]
@@ -51,7 +51,7 @@ pub enum LayersError {
         /// The layer.
         path: PathBuf,
         /// The writer's word.
-        source: IoError,
+        source: Box<IoError>,
     },
     /// A layer cannot be put in place.
     #[error(transparent)]
@@ -107,7 +107,15 @@ impl LayersError {
     pub(crate) fn source(path: &Path, source: IoError) -> Self {
         match source {
             IoError::Store(error) => Self::scratch(error),
-            source => Self::Source { path: path.to_path_buf(), source },
+            source => Self::Source { path: path.to_path_buf(), source: Box::new(source) },
+        }
+    }
+
+    /// What the writer of a layer says.
+    pub(crate) fn layer(path: &Path, source: IoError) -> Self {
+        match source {
+            IoError::Store(error) => Self::scratch(error),
+            source => Self::Layer { path: path.to_path_buf(), source: Box::new(source) },
         }
     }
 

@@ -253,7 +253,7 @@ impl Layers<'_> {
         let staged = StagedFile::create(&path).map_err(LayersError::InPlace)?;
         let (kind, shapes) = (LooseKind::Triangles, &found.shapes);
         write_loose_shapes(staged.partial(), comment, kind, shapes, self.scratch)
-            .map_err(|source| LayersError::Layer { path: path.clone(), source })?;
+            .map_err(|error| LayersError::layer(&path, error))?;
         staged.put_in_place().map_err(LayersError::InPlace)?;
         let file = Some(path.to_string_lossy().into_owned());
         Ok(LayerReport { file, triangles, area: found.area })
