@@ -92,9 +92,9 @@ fn every_point_is_in_a_piece_if_and_only_if_it_is_far() {
 fn threads_shares_and_the_order_of_the_tree_change_nothing() {
     let mut random = Random::new(3);
     // Some are so large that several workers have pieces of them.
-    let mut one = soup(&mut random, 3000, 0.05);
-    one.insert(7, [[-4.0, -4.0, 0.1], [4.0, -4.0, 0.0], [0.0, 4.0, 0.2]]);
-    let other = soup(&mut random, 300, 0.1);
+    let mut one = soup(&mut random, 600, 0.05);
+    one.insert(7, [[-2.0, -2.0, 0.1], [2.0, -2.0, 0.0], [0.0, 2.0, 0.2]]);
+    let other = soup(&mut random, 100, 0.1);
     let gap = Gap { tolerance: 0.05, finest: 0.02 };
     let expected = apart_with((1, AMPLE, false), (&one, &other), gap);
     assert!(expected.iter().filter(|piece| piece.number == 7).count() > 100);

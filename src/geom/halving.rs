@@ -66,7 +66,7 @@ pub fn ball_around(corners: &[DVec3; 3]) -> (DVec3, f64) {
 fn circumcentre(c: DVec3, a: DVec3, b: DVec3) -> DVec3 {
     let normal = a.cross(b);
     let away = (b * a.length_squared() - a * b.length_squared()).cross(normal);
-    let centre = c - away / (2.0 * normal.length_squared());
+    let centre = c + away / (2.0 * normal.length_squared());
     if centre.is_finite() { centre } else { c }
 }
 

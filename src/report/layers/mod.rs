@@ -118,6 +118,8 @@ impl Layers<'_> {
         let threads = self.threads;
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build();
         let pool = pool.map_err(|source| LayersError::Threads { threads, source })?;
+        // What the output takes counts against the limit of the disk as before.
+        self.scratch.adopt(self.output);
         let tolerance = self.tolerance(outcome)?;
         let gap = Gap { tolerance, finest: FINEST_CELLS * outcome.cell_size };
         let of = |one, other| format!("of the {one}, farther than {tolerance} from the {other}");
