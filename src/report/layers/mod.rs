@@ -156,9 +156,11 @@ impl Layers<'_> {
     /// The tolerance, model units.
     fn tolerance(&self, outcome: &Outcome) -> Result<f64, LayersError> {
         let ruler = Ruler { bounds: outcome.input.bounds, unit: self.unit()? };
-        let cells = self.tolerance.in_cells(&ruler, &outcome.grid);
         let no_unit = || LayersError::NoUnit { path: self.input.to_path_buf() };
-        Ok(cells.ok_or_else(no_unit)? * outcome.cell_size)
+        match self.tolerance {
+            Reach::Cells(cells) => Ok(cells * outcome.cell_size),
+            Reach::Length(length) => length.in_model_units(&ruler).ok_or_else(no_unit),
+        }
     }
 
     /// A model as the repair read it or wrote it.
