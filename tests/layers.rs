@@ -13,7 +13,7 @@ use serde_json::Value;
 use tempfile::TempDir;
 
 use crate::inspect_export::obj;
-use crate::support::program::Ended;
+use crate::support::program::{self, Ended};
 
 /// A model, and a folder for layers.
 struct Bench {
@@ -195,6 +195,54 @@ fn layers_are_the_same_whatever_the_limits_and_the_format() {
     // The grid of a GLB is another one, since it holds single precision; the ball is what it was.
     bytes(&["glb", "-j", "2"]);
     assert_eq!(read(&bench.path("layers/removed.ply")), ball);
+}
+
+#[test]
+fn wherever_a_run_is_stopped_the_next_one_writes_the_same_layers() {
+    let hidden = cuboid([4.0; 3], [6.0; 3]);
+    let open = without_lid([20.0, 0.0, 0.0], [30.0, 10.0, 10.0]);
+    let bench = Bench::new(&[cuboid([0.0; 3], [10.0; 3]), hidden, open].concat());
+    let arguments =
+        ["in.obj", "-o", "out.ply", "--depth", "4", "--max-hole", "all", "-q", "-j", "1"];
+    let run = |shim: Option<(&str, u64)>| -> Ended {
+        let mut command = Command::new(env!("CARGO_BIN_EXE_brickmend"));
+        command.arg("repair").args(arguments).args(["--export", "layers"]);
+        command.current_dir(bench.folder.path());
+        if let Some((setting, call)) = shim {
+            command.env("LD_PRELOAD", program::shim()).env("SHIM_ONLY", "1");
+            command.env(setting, call.to_string());
+        }
+        command.output().expect("the program starts").into()
+    };
+    let layers = || {
+        assert_eq!(bench.names(), names(["added.ply", "removed.ply"]));
+        ["added.ply", "removed.ply"]
+            .map(|name| std::fs::read(bench.path("layers").join(name)))
+            .map(|bytes| bytes.expect("there"))
+    };
+    assert_eq!(run(None).code, Some(0));
+    let expected = layers();
+    let mut in_layers = 0;
+    for setting in ["SHIM_KILL_CALL", "SHIM_FAIL_CALL"] {
+        for call in (1..).map(|step| step * 7) {
+            let _ = std::fs::remove_dir_all(bench.path("layers"));
+            let _ = std::fs::remove_file(bench.path("out.ply"));
+            let ended = run(Some((setting, call)));
+            if !ended.is_struck {
+                break;
+            }
+            let is_in_place = bench.path("out.ply").exists();
+            in_layers += u32::from(is_in_place);
+            if setting == "SHIM_FAIL_CALL" && ended.code != Some(0) {
+                assert_eq!(ended.code, Some(5), "{call}: {}", ended.stderr);
+                ended.assert_says_one_line();
+                assert!(!is_in_place || bench.names().iter().all(|name| !name.starts_with('.')));
+            }
+            assert_eq!(run(None).code, Some(0), "{setting} {call}");
+            assert!(layers() == expected, "{setting} {call}");
+        }
+    }
+    assert!(in_layers > 0, "nothing struck while layers were written");
 }
 
 #[test]
