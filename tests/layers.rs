@@ -224,7 +224,8 @@ fn wherever_a_run_is_stopped_the_next_one_writes_the_same_layers() {
     let expected = layers();
     let mut in_layers = 0;
     for setting in ["SHIM_KILL_CALL", "SHIM_FAIL_CALL"] {
-        for call in (1..).map(|step| step * 7) {
+        let mut call = 5;
+        loop {
             let _ = std::fs::remove_dir_all(bench.path("layers"));
             let _ = std::fs::remove_file(bench.path("out.ply"));
             let ended = run(Some((setting, call)));
@@ -233,6 +234,7 @@ fn wherever_a_run_is_stopped_the_next_one_writes_the_same_layers() {
             }
             let is_in_place = bench.path("out.ply").exists();
             in_layers += u32::from(is_in_place);
+            call += if is_in_place { 5 } else { 60 };
             if setting == "SHIM_FAIL_CALL" && ended.code != Some(0) {
                 assert_eq!(ended.code, Some(5), "{call}: {}", ended.stderr);
                 ended.assert_says_one_line();

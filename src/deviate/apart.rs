@@ -1,10 +1,10 @@
 //! What of a surface lies farther from another one than some length, as triangles: whole ones where
 //! all of a triangle does, and pieces where a part of it does.
 //!
-//! A piece of a triangle is judged from the middle of the ball around it. All of it is far where nothing
-//! lies within the length and the ball's radius of that. Nothing of it is far where one triangle of the
-//! other surface is near all of its corners: the distance from what is convex is convex. Else it is
-//! halved, until its edges are short; then the middle decides.
+//! All of a piece of a triangle is far where no triangle of the other surface comes within the length:
+//! those of a ball around it are asked, and where that does not tell, all that may. Nothing of it is far
+//! where one triangle is near all of its corners, since the distance from what is convex is convex. Else it
+//! is halved, until its edges are short; then the middle of the ball decides.
 //!
 //! In:         a [`MeshSource`], a [`Target`], a [`Gap`].
 //! Out:        [`Piece`]s in the order of the source. Triangles with infinite corners, and those without
@@ -28,9 +28,11 @@ use crate::store::{Scales, StoreError, ordered_by_weight};
 const MOST_PIECES: f64 = 4096.0;
 /// Triangles of an item.
 const CHUNK: usize = 256;
-/// Distances are right to this share of the largest coordinate: walls exactly as thick as the gap are
-/// near all over, whatever rounding says here and there.
-const SLACK: f64 = 1.0 / (1_u64 << 44) as f64;
+/// Distances are right to this share of the largest coordinate.
+const ROUNDING: f64 = 1.0 / (1_u64 << 44) as f64;
+/// What is farther than the tolerance by less than this share of a fine edge is near, so that walls just as
+/// thick as it are so all over, whatever their vertices were rounded to.
+const SLACK: f64 = 1.0 / 512.0;
 
 /// What is far.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -184,7 +186,7 @@ struct Judge<'t> {
 
 impl<'t> Judge<'t> {
     fn new(target: &'t Target, gap: &Gap, share_bytes: u64) -> Self {
-        let slack = target.reach * SLACK;
+        let slack = (gap.finest * SLACK).max(4.0 * target.reach * ROUNDING);
         Self { walker: Walker::new(&target.tree, share_bytes), gap: *gap, slack }
     }
 
@@ -223,25 +225,35 @@ impl<'t> Judge<'t> {
 
     /// How a piece lies; a fine one is never mixed.
     fn verdict(&mut self, points: &[DVec3; 3], is_fine: bool) -> Result<Verdict, StoreError> {
-        let tolerance = self.gap.tolerance;
-        let far = tolerance + self.slack;
+        let far = self.gap.tolerance + self.slack;
         let (middle, radius) = ball_around(points);
-        let found = if is_fine {
-            self.walker.within(middle, far, |_| true)?
-        } else {
-            let tolerance_squared = tolerance * tolerance;
-            self.walker.within(middle, far + self.slack + radius, |triangle| {
-                let corners = triangle.points();
-                points.iter().all(|point| {
-                    let closest = closest_on_triangle(*point, corners);
-                    point.distance_squared(closest) <= tolerance_squared
-                })
-            })?
-        };
+        if is_fine {
+            return Ok(match self.walker.within(middle, far, |_| true)? {
+                Within::Settled => Verdict::Near,
+                Within::Open(_) | Within::Nothing => Verdict::Far,
+            });
+        }
+        // Nearer, and farther, than what decides for a fine piece, by more than rounding.
+        let near_squared = (far - self.slack / 2.0).powi(2);
+        let surely_far = far + self.slack / 2.0;
+        let found = self.walker.within(middle, surely_far + radius, |triangle| {
+            let corners = triangle.points();
+            points.iter().all(|point| {
+                let closest = closest_on_triangle(*point, corners);
+                point.distance_squared(closest) <= near_squared
+            })
+        })?;
         Ok(match found {
             Within::Settled => Verdict::Near,
-            Within::Open => Verdict::Mixed,
             Within::Nothing => Verdict::Far,
+            // Its middle is far: so all of it may be, as a face of a wall is from the other one.
+            Within::Open(distance_squared) if distance_squared > surely_far * surely_far => {
+                match self.walker.reaches(points, surely_far)? {
+                    true => Verdict::Mixed,
+                    false => Verdict::Far,
+                }
+            }
+            Within::Open(_) => Verdict::Mixed,
         })
     }
 }

@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::deviate::pages::Pages;
 use crate::deviate::reading::Triangle;
 use crate::deviate::tree::{Bounds, GROUP, Tree};
-use crate::geom::closest_on_triangle;
+use crate::geom::{are_within, closest_on_triangle};
 use crate::store::StoreError;
 
 /// What is nearest to a point.
@@ -60,10 +60,32 @@ pub(crate) fn near_on(
 pub(crate) enum Within {
     /// A triangle settled the question.
     Settled,
-    /// There are triangles, and none of those that were asked settled it.
-    Open,
+    /// None of those that were asked did; the square of the distance to the nearest one.
+    Open(f64),
     /// Nothing is within the reach.
     Nothing,
+}
+
+/// All that may be within some reach of a piece of a plane.
+struct Around {
+    low: DVec3,
+    high: DVec3,
+    normal: DVec3,
+    on_plane: DVec3,
+    reach: f64,
+}
+
+impl Around {
+    /// Whether a box has a part in it; some have not though this says so.
+    fn meets(&self, bounds: &Bounds) -> bool {
+        let (low, high) = (DVec3::from(bounds.low), DVec3::from(bounds.high));
+        if low.cmpgt(self.high).any() || high.cmplt(self.low).any() {
+            return false;
+        }
+        let half = (high - low) / 2.0;
+        let from_plane = self.normal.dot(low.midpoint(high) - self.on_plane).abs();
+        from_plane <= self.reach + self.normal.abs().dot(half)
+    }
 }
 
 /// A walker of one tree; each worker has its own.
@@ -171,9 +193,41 @@ impl<'t> Walker<'t> {
         self.last = nearest;
         Ok(match nearest {
             _ if found => Within::Settled,
-            Some(_) => Within::Open,
+            Some(_) => Within::Open(bound_squared),
             None => Within::Nothing,
         })
+    }
+
+    /// Whether any triangle has a point no farther than `reach` from a `piece` of a plane, but for
+    /// rounding.
+    pub(crate) fn reaches(&mut self, piece: &[DVec3; 3], reach: f64) -> Result<bool, StoreError> {
+        let [a, b, c] = *piece;
+        let around = Around {
+            low: a.min(b).min(c) - reach,
+            high: a.max(b).max(c) + reach,
+            normal: (b - a).cross(c - a).normalize_or_zero(),
+            on_plane: a,
+            reach,
+        };
+        self.start();
+        while let Some((_, level, node)) = self.stack.pop() {
+            if level == 0 {
+                for triangle in self.triangles.group(node * GROUP)? {
+                    if are_within(reach, piece, &triangle.points()) {
+                        self.last = Some(*triangle);
+                        return Ok(true);
+                    }
+                }
+                continue;
+            }
+            let children = self.levels[level - 1].group(node * GROUP)?;
+            for (child, bounds) in (node * GROUP..).zip(children) {
+                if around.meets(bounds) {
+                    self.stack.push((0.0, level - 1, child));
+                }
+            }
+        }
+        Ok(false)
     }
 
     /// Forgets what the last point had nearest: then an answer depends on the tree and the point.
