@@ -19,6 +19,7 @@ mod hidden;
 mod hostile;
 mod inspect;
 mod inspect_export;
+mod layers;
 mod levels;
 mod materials;
 mod mend;

@@ -17,7 +17,7 @@ use crate::support::program::Ended;
 const LIMITS: [[&str; 2]; 3] = [["1", "64MiB"], ["4", "64MiB"], ["4", "1GiB"]];
 
 /// OBJ in which corners in one place are one vertex.
-fn obj(triangles: &[Corners]) -> String {
+pub fn obj(triangles: &[Corners]) -> String {
     let (mut vertices, mut faces) = (String::new(), String::new());
     let mut numbers = BTreeMap::new();
     for corners in triangles {

@@ -1,7 +1,7 @@
 //! `docs/outcome.md` names every field of the outcome, and no other.
 
 use brickmend::monitor::Stage;
-use brickmend::repair::{SCHEMA_VERSION, StageReport};
+use brickmend::repair::{LayerReport, LayersReport, SCHEMA_VERSION, StageReport};
 use brickmend::sign::FillRule;
 
 use crate::support::schema::check_document;
@@ -72,6 +72,13 @@ fn the_documentation_names_every_field_and_no_other() {
     // The caller stamps these.
     outcome.stages = Stage::ALL.map(|stage| (stage, StageReport::default())).into();
     outcome.memory.peak_bytes = Some(0);
+    let layer = LayerReport::default();
+    outcome.exports = Some(LayersReport {
+        tolerance: 0.0,
+        removed: layer.clone(),
+        added: layer.clone(),
+        patches: Some(layer),
+    });
     let json = serde_json::to_value(&outcome).expect("plain data is always JSON");
     assert_eq!(json["schema"], SCHEMA_VERSION);
     check_document("docs/outcome.md", &json, &CONDITIONAL);

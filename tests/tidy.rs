@@ -392,6 +392,7 @@ fn links_in_the_documents_lead_somewhere() {
         "docs/outcome.md",
         "docs/estimate.md",
         "docs/inspect.md",
+        "docs/layers.md",
         "docs/verify.md",
         "docs/journal.md",
         "docs/parts.md",

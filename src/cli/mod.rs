@@ -11,6 +11,7 @@ mod export;
 mod fleet;
 mod inspect;
 mod last_words;
+mod layers;
 mod man;
 mod memory;
 mod numbers;

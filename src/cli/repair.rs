@@ -10,11 +10,12 @@ use brickmend::repair::{
     Levels, Limits, Outcome, PartsOutcome, PartsRule, RepairError, SCHEMA_VERSION, Settings,
     Verdict, repair, repair_levels, repair_parts,
 };
-use brickmend::report::Views;
+use brickmend::report::{LayersError, Views};
 use clap::Args;
 
 use crate::cli::arguments::{ResourceArguments, ResultArguments, parse_size};
 use crate::cli::exit_code::{EXIT_STATUS, Exit};
+use crate::cli::layers::{LayerArguments, Wanted, lines};
 use crate::cli::memory::peak_resident_bytes;
 use crate::cli::pictures::{DrawOptions, Pictured, draw_preview, write_page};
 use crate::cli::progress::{Chatter, Progress, on_one_line};
@@ -38,8 +39,8 @@ pub struct RepairArguments {
     /// Levels of detail: one file for each of these values of --decimate, such as
     /// 0,0.1,0.5,2cells, from one run; for -o out.ply they are out.0cells.ply, out.0.1cells.ply and
     /// so on.
-    #[arg(long, value_name = "LENGTHS", conflicts_with_all = ["decimate", "max_triangles", "preview", "report"],
-          help_heading = "Result")]
+    #[arg(long, value_name = "LENGTHS", help_heading = "Result",
+          conflicts_with_all = ["decimate", "max_triangles", "preview", "report", "export"])]
     lod: Option<Levels>,
     #[command(flatten)]
     resources: ResourceArguments,
@@ -70,6 +71,8 @@ pub struct RepairArguments {
     /// Draw the edges of the triangles as well.
     #[arg(long, requires = "preview", help_heading = "Report")]
     preview_edges: bool,
+    #[command(flatten)]
+    layers: LayerArguments,
 }
 
 /// Runs the command.
@@ -94,11 +97,28 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
         ..arguments.resources.limits()
     };
     let (input, output) = (&arguments.input, &arguments.output);
+    let wanted = Wanted {
+        arguments: &arguments.layers,
+        input,
+        output,
+        settings: &settings,
+        limits: &limits,
+        monitor: &progress,
+    };
+    if arguments.layers.export.is_some() && settings.parts == PartsRule::Separate {
+        return fail(&RepairError::OnlyAsUnion { option: "--export" }, &stop, chatter);
+    }
+    if let Err(error) = wanted.prepare() {
+        return fail_layers(&error, &stop, chatter).into();
+    }
     if arguments.only_broken {
         let copied = copy(arguments, &limits, &progress);
         progress.clear();
         match copied {
-            Ok(Copied::Done(files)) => return finish_copy(arguments, files, chatter),
+            Ok(Copied::Done(files)) => {
+                let cleared = wanted.clear().map_err(|error| fail_layers(&error, &stop, chatter));
+                return finish_copy(arguments, files, cleared.err(), chatter);
+            }
             Ok(Copied::Not(Some(reason))) => chatter.say(&on_one_line(&reason)),
             Ok(_) => {}
             Err(error) => return fail(&error, &stop, chatter),
@@ -119,7 +139,10 @@ pub fn run(arguments: &RepairArguments, chatter: &Chatter) -> ExitCode {
             for outcome in &mut outcomes {
                 outcome.stages = progress.stages();
             }
-            finish(arguments, &mut outcomes, chatter)
+            let written = outcomes.iter_mut().try_for_each(|outcome| wanted.write(outcome));
+            progress.clear();
+            let failed = written.err().map(|error| fail_layers(&error, &stop, chatter));
+            finish(arguments, &mut outcomes, failed, chatter)
         }
         Err(error) => fail(&error, &stop, chatter),
     }
@@ -150,9 +173,15 @@ struct CopyOutcome {
     files: Vec<String>,
 }
 
-/// Tells that the model was copied, draws the preview.
-fn finish_copy(arguments: &RepairArguments, files: Vec<PathBuf>, chatter: &Chatter) -> ExitCode {
-    let mut exit = drawn(arguments, None, chatter).unwrap_or(Exit::Success);
+/// Tells that the model was copied, draws the preview; `failed` is how the process ends otherwise.
+fn finish_copy(
+    arguments: &RepairArguments,
+    files: Vec<PathBuf>,
+    failed: Option<Exit>,
+    chatter: &Chatter,
+) -> ExitCode {
+    let drawn = drawn(arguments, None, chatter);
+    let mut exit = drawn.or(failed).unwrap_or(Exit::Success);
     if let Some(path) = &arguments.report
         && let Err(error) = write_page(path, &pictured(arguments, None))
     {
@@ -276,10 +305,25 @@ fn fail(error: &RepairError, stop: &Stop, chatter: &Chatter) -> ExitCode {
     }
 }
 
-/// Tells the outcomes, draws the preview.
-fn finish(arguments: &RepairArguments, outcomes: &mut [Outcome], chatter: &Chatter) -> ExitCode {
+/// How the process ends where layers failed.
+fn fail_layers(error: &LayersError, stop: &Stop, chatter: &Chatter) -> Exit {
+    chatter.error(error);
+    match Exit::from(error.blame()) {
+        Exit::Interrupted => stop.exit(),
+        exit => exit,
+    }
+}
+
+/// Tells the outcomes, draws the preview; `failed` is how the process ends otherwise.
+fn finish(
+    arguments: &RepairArguments,
+    outcomes: &mut [Outcome],
+    failed: Option<Exit>,
+    chatter: &Chatter,
+) -> ExitCode {
     let sound = outcomes.iter().all(|outcome| outcome.verdict != Verdict::Fail);
     let exit = if sound { Exit::Success } else { Exit::NoResult };
+    let exit = failed.unwrap_or(exit);
     let mut exit = drawn(arguments, outcomes.first(), chatter).unwrap_or(exit);
     for outcome in outcomes.iter_mut() {
         outcome.memory.peak_bytes = peak_resident_bytes();
@@ -320,6 +364,7 @@ fn summary(outcome: &Outcome) -> String {
         text.push_str("\n  note: ");
         text.push_str(caveat);
     }
+    text.push_str(&outcome.exports.as_ref().map_or(String::new(), lines));
     if outcome.verdict != Verdict::Pass {
         for reason in &outcome.reasons {
             text.push_str("\n  look: ");

@@ -4,7 +4,8 @@
 //! In:         two surfaces as [`MeshSource`]s, each read once into a [`Surface`]: triangles in a
 //!             tree of boxes, samples spread evenly over their area, and their sharp edges.
 //! Out:        a [`Deviation`]: distances both ways, normals, what is lost and invented, creases. Or, of a
-//!             [`Target`], the distance of whatever points are asked for.
+//!             [`Target`], the distance of whatever points are asked for, or the [`Piece`]s of
+//!             another surface that lie farther from it than some length.
 //! Invariant:  depends on the two files and the [`DeviationOptions`] alone: not on the share, and
 //!             not on threads. The distance of a sample is that to the nearest of all triangles.
 //! Units:      model units, the same in both files; angles in degrees.
@@ -17,6 +18,9 @@
 //!             Vincent 1995 (nearest neighbours in a tree of boxes); Lauterbach et al. 2009 (trees
 //!             of boxes in Morton order).
 
+mod apart;
+#[cfg(test)]
+mod apart_tests;
 mod compare;
 mod creases;
 mod deviation;
@@ -25,6 +29,7 @@ mod error;
 mod nearest;
 mod pages;
 mod parts;
+mod pieces;
 mod quantiles;
 mod reading;
 mod samples;
@@ -35,10 +40,12 @@ mod target;
 mod tests;
 mod tree;
 
+pub use apart::Gap;
 pub use compare::compare;
 pub use deviation::{CreaseReport, Deviation, Distances, LostReport, Normals, Separation};
 pub use error::DeviateError;
 pub use parts::PartsSeen;
+pub use pieces::Piece;
 pub use surface::{Surface, SurfaceOptions};
 pub use target::Target;
 

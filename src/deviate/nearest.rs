@@ -5,7 +5,7 @@ use glam::DVec3;
 use crate::deviate::pages::Pages;
 use crate::deviate::reading::Triangle;
 use crate::deviate::tree::{Bounds, GROUP, Tree};
-use crate::geom::closest_on_triangle;
+use crate::geom::{are_within, closest_on_triangle};
 use crate::store::StoreError;
 
 /// What is nearest to a point.
@@ -53,6 +53,39 @@ pub(crate) fn near_on(
         let cosine = cosine_between(normal, triangle.normal());
         Near { distance_squared, point: closest, cosine, triangle: *triangle }
     })
+}
+
+/// What a search within a reach ends with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) enum Within {
+    /// A triangle settled the question.
+    Settled,
+    /// None of those that were asked did; the square of the distance to the nearest one.
+    Open(f64),
+    /// Nothing is within the reach.
+    Nothing,
+}
+
+/// All that may be within some reach of a piece of a plane.
+struct Around {
+    low: DVec3,
+    high: DVec3,
+    normal: DVec3,
+    on_plane: DVec3,
+    reach: f64,
+}
+
+impl Around {
+    /// Whether a box has a part in it; some have not though this says so.
+    fn meets(&self, bounds: &Bounds) -> bool {
+        let (low, high) = (DVec3::from(bounds.low), DVec3::from(bounds.high));
+        if low.cmpgt(self.high).any() || high.cmplt(self.low).any() {
+            return false;
+        }
+        let half = (high - low) / 2.0;
+        let from_plane = self.normal.dot(low.midpoint(high) - self.on_plane).abs();
+        from_plane <= self.reach + self.normal.abs().dot(half)
+    }
 }
 
 /// A walker of one tree; each worker has its own.
@@ -114,6 +147,92 @@ impl<'t> Walker<'t> {
         }
         self.last = best.map(|best| best.triangle);
         Ok(best)
+    }
+
+    /// Looks for what is within `reach` of `point`, nearer and nearer, until a triangle `settles` the
+    /// question.
+    pub(crate) fn within(
+        &mut self,
+        point: DVec3,
+        reach: f64,
+        settles: impl Fn(&Triangle) -> bool,
+    ) -> Result<Within, StoreError> {
+        let mut bound_squared = reach * reach;
+        let mut nearest = None;
+        let mut is_settled = |triangle: &Triangle, bound_squared: &mut f64| {
+            let closest = closest_on_triangle(point, triangle.points());
+            let distance_squared = point.distance_squared(closest);
+            if distance_squared > *bound_squared {
+                return false;
+            }
+            *bound_squared = distance_squared;
+            nearest = Some(*triangle);
+            settles(triangle)
+        };
+        let mut found = self.last.is_some_and(|last| is_settled(&last, &mut bound_squared));
+        self.start();
+        while !found && let Some((bound, level, node)) = self.stack.pop() {
+            if bound > bound_squared {
+                continue;
+            }
+            if level == 0 {
+                let mut triangles = self.triangles.group(node * GROUP)?.iter();
+                found = triangles.any(|triangle| is_settled(triangle, &mut bound_squared));
+                continue;
+            }
+            let from = self.stack.len();
+            for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
+            {
+                let bound = bounds.distance_squared(point);
+                if bound <= bound_squared {
+                    self.stack.push((bound, level - 1, child));
+                }
+            }
+            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+        }
+        self.last = nearest;
+        Ok(match nearest {
+            _ if found => Within::Settled,
+            Some(_) => Within::Open(bound_squared),
+            None => Within::Nothing,
+        })
+    }
+
+    /// Whether any triangle has a point no farther than `reach` from a `piece` of a plane, but for
+    /// rounding.
+    pub(crate) fn reaches(&mut self, piece: &[DVec3; 3], reach: f64) -> Result<bool, StoreError> {
+        let [a, b, c] = *piece;
+        let around = Around {
+            low: a.min(b).min(c) - reach,
+            high: a.max(b).max(c) + reach,
+            normal: (b - a).cross(c - a).normalize_or_zero(),
+            on_plane: a,
+            reach,
+        };
+        self.start();
+        while let Some((_, level, node)) = self.stack.pop() {
+            if level == 0 {
+                for triangle in self.triangles.group(node * GROUP)? {
+                    if are_within(reach, piece, &triangle.points()) {
+                        self.last = Some(*triangle);
+                        return Ok(true);
+                    }
+                }
+                continue;
+            }
+            let children = self.levels[level - 1].group(node * GROUP)?;
+            for (child, bounds) in (node * GROUP..).zip(children) {
+                if around.meets(bounds) {
+                    self.stack.push((0.0, level - 1, child));
+                }
+            }
+        }
+        Ok(false)
+    }
+
+    /// Forgets what the last point had nearest: then an answer depends on the tree and the point.
+    pub(crate) fn forget(&mut self) {
+        self.last = None;
     }
 
     /// A triangle that the ray meets and light does not pass, whichever is found first.

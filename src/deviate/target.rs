@@ -20,8 +20,10 @@ const CHUNK: usize = 512;
 
 /// A surface that points are measured against.
 pub struct Target {
-    tree: Tree,
+    pub(crate) tree: Tree,
     diagonal: f64,
+    /// The largest coordinate, without its sign.
+    pub(crate) reach: f64,
     unit: Option<LengthUnit>,
 }
 
@@ -43,7 +45,8 @@ impl Target {
         }
         let [low, high] = tape.bounds.map(DVec3::from);
         let (diagonal, unit) = (low.distance(high), source.unit());
-        Ok(Some(Self { tree: tree_of(tape, is_coherent, means)?, diagonal, unit }))
+        let reach = low.abs().max(high.abs()).max_element();
+        Ok(Some(Self { tree: tree_of(tape, is_coherent, means)?, diagonal, reach, unit }))
     }
 
     /// Diagonal of its box, model units.

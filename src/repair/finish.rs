@@ -83,6 +83,7 @@ pub fn conclude(
             caveat: run.settings.method.caveat().map(str::to_owned),
         },
         deviation: findings.deviation.clone(),
+        exports: None,
         mend: findings.mend.clone(),
         thickened: findings.thickened,
         hidden: findings.hidden.clone(),

@@ -46,12 +46,12 @@ pub use inspect::{inspect, inspect_exporting};
 pub use inspection::{
     INSPECTION_VERSION, InspectSettings, Inspection, ModelSize, RepairCost, ToleranceReport,
 };
-pub use length::{Length, LengthError, Reach};
+pub use length::{Length, LengthError, Reach, Ruler};
 pub use levels::Levels;
 pub use lock::lock_folder;
 pub use outcome::{
-    DiskReport, Dropped, Found, Invented, MemoryReport, Outcome, OutputReport, ResumeReport,
-    SCHEMA_VERSION, SoupReport, StageReport, Verdict,
+    DiskReport, Dropped, Found, Invented, LayerReport, LayersReport, MemoryReport, Outcome,
+    OutputReport, ResumeReport, SCHEMA_VERSION, SoupReport, StageReport, Verdict,
 };
 pub use parts::{LeftOut, PartReport, PartsOutcome, repair_parts};
 pub use plan::{MemoryPlan, floor_bytes};

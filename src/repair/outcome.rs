@@ -131,6 +131,30 @@ pub struct TransferReport {
     pub lost: Vec<String>,
 }
 
+/// A file of what was taken away, or added.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LayerReport {
+    /// Its path; `None` where there is nothing to be in it.
+    pub file: Option<String>,
+    /// Its triangles.
+    pub triangles: u64,
+    /// Their area, square model units.
+    pub area: f64,
+}
+
+/// Files of what was taken away and added; the caller has them written.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct LayersReport {
+    /// What lies farther away is removed or added, model units.
+    pub tolerance: f64,
+    /// What of the input is not near the output.
+    pub removed: LayerReport,
+    /// What of the output is not near the input.
+    pub added: LayerReport,
+    /// What closes openings; `None` where the output does not tell.
+    pub patches: Option<LayerReport>,
+}
+
 /// What a stage took; the caller stamps the seconds.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct StageReport {
@@ -210,6 +234,10 @@ pub struct Outcome {
     /// How far the output lies from the input; `None` if that was not wanted, or the input is too
     /// large for squares of its lengths.
     pub deviation: Option<Deviation>,
+    /// What was taken away and added, as files; `None` if that was not wanted. The caller has them
+    /// written.
+    #[serde(default)]
+    pub exports: Option<LayersReport>,
     /// Counts of mending: walls and fills.
     pub mend: MendStats,
     /// Counts of what was thickened.

@@ -31,7 +31,8 @@ impl StagedFile {
             let file = options.open(&partial)?;
             // Two runs with one target: the second does not write into the first one's file.
             file.try_lock()?;
-            file.set_len(0)?;
+            // From here on it is ours, and so is what becomes of it.
+            file.set_len(0).inspect_err(|_| drop(fs::remove_file(&partial)))?;
             Ok(file)
         };
         let file = create().map_err(|source| PreviewError::io("create", &partial, source))?;

@@ -2,7 +2,7 @@
 //!
 //! In:      meshes as streams ([`crate::mesh::MeshSource`]), outcomes, the journal; never the stages
 //!          that made them.
-//! Out:     pictures and pages, put in place only when complete.
+//! Out:     pictures, pages and layers, put in place only when complete.
 //! Memory:  what the caller states as a share; see [`preview`].
 
 mod catalogue_page;
@@ -12,6 +12,7 @@ mod html;
 mod image_exr;
 mod image_png;
 mod image_staged;
+mod layers;
 mod light_mesh;
 mod model_page;
 mod pictures;
@@ -20,6 +21,7 @@ pub mod preview;
 pub use catalogue_page::{FOLDER, INDEX, report_folder, write_catalogue_page};
 pub use coloured::write_coloured;
 pub use error::ReportError;
+pub use layers::{DEFAULT_TOLERANCE, Layers, LayersError};
 pub use model_page::{Gallery, MapOptions, ModelPage, PageOptions, PartsPage, write_model_page};
 pub use preview::{
     Measuring, OpenSource, PatchRule, PreviewError, PreviewOptions, PreviewStats, Scene, Side,
