@@ -13,9 +13,7 @@ use glam::DVec3;
 
 use crate::bridge::sheets::Sheets;
 use crate::octree::points::is_owned;
-use crate::octree::{
-    BinnedSoup, BrickKey, Domain, LostHits, Panes, SoupBin, SoupEdges, SoupTriangle,
-};
+use crate::octree::{BinnedSoup, BrickKey, Domain, LostHits, SoupBin, SoupTriangle};
 use crate::store::{Resources, Sorted, Sorter, StoreError, Table};
 
 /// Share of its hits that a wall loses when it is thin: of a plate that is t cells thick 1 - t.
@@ -71,12 +69,6 @@ impl Hits {
         self.lost >= LEAST_LOST && self.lost >= LOST_SHARE * self.expected
             || self.inner >= LEAST_LOST && self.inner >= LOST_INNER_SHARE * self.expected
     }
-
-    /// Whether a piece that this is a part of may be torn.
-    fn may_be_of_torn(self) -> bool {
-        self.lost >= LOST_SHARE * self.expected
-            || self.inner > 0.0 && self.inner >= LOST_INNER_SHARE * self.expected
-    }
 }
 
 /// How many edges of the grid a triangle hits on average.
@@ -92,7 +84,6 @@ pub(crate) struct Losses<'d> {
     counts: Table<[u32; 2]>,
     domain: &'d Domain,
     given: u64,
-    triangles: u64,
 }
 
 impl<'d> Losses<'d> {
@@ -117,7 +108,7 @@ impl<'d> Losses<'d> {
             }
             all.push(counts)?;
         }
-        Ok(Self { counts: all, domain, given, triangles })
+        Ok(Self { counts: all, domain, given })
     }
 
     /// Whether a triangle is judged in this brick. Walls and fills are as thick as they should be.
@@ -150,46 +141,8 @@ impl<'d> Losses<'d> {
         Ok(pieces)
     }
 
-    /// Whether some piece may be torn; never `false` where one is.
-    ///
-    /// Only bricks that lost enough for one are looked at, and sheets are joined in these alone. That
-    /// divides a piece further: where none of its parts loses the share, neither does the whole.
-    pub(crate) fn may_tear(
-        &mut self,
-        soup: &BinnedSoup,
-        resources: &Resources,
-    ) -> Result<bool, StoreError> {
-        let hurt = self.hurt_bricks(soup, resources)?;
-        if hurt.is_empty() {
-            return Ok(false);
-        }
-        let is_hurt = |bin: &SoupBin| hurt.contains(&bin.brick.0);
-        let edges = SoupEdges::find_in(soup, self.domain, Panes::Apart, is_hurt, resources)?;
-        let mut sheets = Sheets::join(edges.pairs, self.triangles, resources)?;
-        let mut walk = soup.walk();
-        while let Some(bin) = walk.next_bin()? {
-            if !is_hurt(&bin) {
-                continue;
-            }
-            let pieces = self.pieces_of(&bin, soup, &mut sheets)?;
-            if pieces.values().any(|hits| hits.may_be_of_torn()) {
-                return Ok(true);
-            }
-            let mut is_torn = false;
-            bin.each(soup, |triangle| {
-                is_torn |=
-                    self.is_judged(triangle, bin.brick) && self.hits_of(triangle)?.is_torn_alone();
-                Ok(())
-            })?;
-            if is_torn {
-                return Ok(true);
-            }
-        }
-        Ok(false)
-    }
-
     /// The bricks that lost enough hits for a piece that is torn.
-    fn hurt_bricks(
+    pub(crate) fn hurt_bricks(
         &mut self,
         soup: &BinnedSoup,
         resources: &Resources,

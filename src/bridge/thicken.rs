@@ -2,8 +2,8 @@
 //! opening told of.
 //!
 //! A triangle gets a slab around it, two cells thick by default, besides what is there, where it
-//! loses more than a few of its hits; small triangles are judged together, those of one sheet in
-//! one brick.
+//! loses more than a few of its hits; small triangles are judged together, those in one brick that
+//! are joined across edges in bricks that lose hits.
 //!
 //! In:         the mended soup in bins, and the hits that were lost, by triangle.
 //! Out:        bins of all that is added to the soup: walls and fills of before, and the slabs.
@@ -20,8 +20,8 @@ use crate::bridge::sheets::{MOST_TRIANGLES, Sheets};
 use crate::bridge::walls::Slab;
 use crate::bridge::{Added, Like, MendOptions};
 use crate::octree::{
-    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, Panes, SoupEdges, SoupTriangle,
-    write_bins,
+    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, Panes, SoupBin, SoupEdges,
+    SoupTriangle, write_bins,
 };
 use crate::store::{Resources, Sorter, Spool, StoreError};
 
@@ -82,10 +82,12 @@ pub fn thicken(
         return Ok(None);
     }
     let mut losses = Losses::new(lost, domain, (given, first), resources)?;
-    if !losses.may_tear(soup, resources)? {
+    let hurt = losses.hurt_bricks(soup, resources)?;
+    if hurt.is_empty() {
         return Ok(None);
     }
-    let pairs = SoupEdges::find(soup, domain, Panes::Apart, resources)?.pairs;
+    let is_hurt = |bin: &SoupBin| hurt.contains(&bin.brick.0);
+    let pairs = SoupEdges::find_in(soup, domain, Panes::Apart, is_hurt, resources)?.pairs;
     let mut sheets = Sheets::join(pairs, first, resources)?;
     let mut added = Added::new(domain, first, options, SLAB_ORIGINS, resources)?;
     let mut stats = ThickenStats::default();
@@ -93,6 +95,9 @@ pub fn thicken(
     while let Some(bin) = walk.next_bin()? {
         if resources.monitor.cancelled() {
             return Err(StoreError::Cancelled);
+        }
+        if !is_hurt(&bin) {
+            continue;
         }
         let pieces = losses.pieces_of(&bin, soup, &mut sheets)?;
         if pieces.is_empty() {
