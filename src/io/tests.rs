@@ -275,6 +275,19 @@ fn ascii_ply_passes_over_strange_lists_and_keeps_colours() {
 }
 
 #[test]
+fn a_remark_without_its_keyword_before_the_elements_of_a_ply_is_passed_over() {
+    let remark = "format ascii 1.0\nCreated by hand: with care";
+    let text = ascii_ply().replacen("format ascii 1.0", remark, 1);
+    let content = read_bytes("a.ply", text.as_bytes()).expect("readable");
+    assert_eq!(content, read_bytes("b.ply", ascii_ply().as_bytes()).expect("readable"));
+    for (from, to) in [("format ascii 1.0", "Created by hand"), ("end_header", "end header")] {
+        let text = ascii_ply().replacen(from, to, 1);
+        let error = read_bytes("c.ply", text.as_bytes()).expect_err("no header");
+        assert!(error.to_string().contains("expected format, comment"), "{error}");
+    }
+}
+
+#[test]
 fn both_byte_orders_and_faces_before_vertices_read_alike() {
     let little = read_bytes("b.ply", &binary_ply(false)).expect("readable");
     assert_eq!(little, read_bytes("c.ply", &binary_ply(true)).expect("readable"));

@@ -169,6 +169,8 @@ impl Header {
                     element.properties.push(read_property(words, element.kind)?);
                 }
                 Some(b"end_header") => break,
+                // Remarks without their keyword, as Blender 2.4 wrote them.
+                Some(_) if encoding.is_some() && elements.is_empty() => {}
                 Some(other) => {
                     let found = shown(other);
                     let expected = "format, comment, element, property or end_header";
