@@ -13,8 +13,8 @@ Peers, each left out with a word if it is not there:
   --peer    any other: COMMAND with {in} {out} {cell} {depth} {scale}; writes PLY.
 
 From file to file: processor seconds (user and system), wall time and peak memory are the kernel's
-(wait4). Every round runs each program once, in turning order; medians are told. brickmend's proof,
-which no peer has, is on its clock and told apart (its own stage timings). Seconds per million leaf
+(wait4). Every round runs each program once, in turning order; medians are told. brickmend's proof
+and measuring, which no peer has, are on its clock and told apart (its own stage timings). Seconds per million leaf
 cells use brickmend's count of leaf cells for all, since mesh and cell are the same. --judge is run
 on every output of the first round, up to --judge-depth: see `judge` in measure.py.
 
@@ -242,9 +242,10 @@ class Bench:
     def cpu(self, depth, name):
         return self.middle(depth, name, lambda r: r["cpu_seconds"])
 
-    def without_proof(self, depth, name):
-        """CPU seconds of brickmend less those of its last stage."""
-        return self.middle(depth, name, lambda r: r["cpu_seconds"] - r["parts"]["verify"])
+    def without_checks(self, depth, name):
+        """CPU seconds of brickmend less those of its proof and of measuring how far it lies off."""
+        checks = ("verify", "deviate")
+        return self.middle(depth, name, lambda r: r["cpu_seconds"] - sum(r["parts"][c] for c in checks))
 
     def without_start(self, depth, name):
         """CPU seconds of Blender less those of its start; of others, all of them."""

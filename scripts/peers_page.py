@@ -32,23 +32,23 @@ def figures(bench):
                 measure.short(runs[0].get("faces")),
             ])
             if tool.kind == "own":
-                less = bench.without_proof(depth, tool.name)
+                less = bench.without_checks(depth, tool.name)
                 each = measure.short(less / millions)
-                rows.append([depth, f"{tool.name}, less its proof", measure.short(less), "", "", "", each, ""])
+                rows.append([depth, f"{tool.name}, less proof and measuring", measure.short(less), "", "", "", each, ""])
     return measure.table(head, rows)
 
 
 def ratios(bench):
     """The table of peers over brickmend (its first variant)."""
     head = [
-        "depth", "peer", "CPU", "CPU, without the proof", "CPU, without either's extras", "wall", "memory",
+        "depth", "peer", "CPU", "CPU, without the checks", "CPU, without either's extras", "wall", "memory",
     ]
     own, rows = bench.tools[0].name, []
     for depth in bench.depths():
         for tool in bench.tools:
             if tool.kind != "peer" or not bench.of(depth, tool.name) or not bench.of(depth, own):
                 continue
-            ours, bare = bench.cpu(depth, own), bench.without_proof(depth, own)
+            ours, bare = bench.cpu(depth, own), bench.without_checks(depth, own)
             pairs = [
                 (bench.cpu(depth, tool.name), ours),
                 (bench.cpu(depth, tool.name), bare),
@@ -117,7 +117,7 @@ def page(bench):
         figures(bench),
         "## Ratios\n",
         f"The peer's figure over that of {bench.tools[0].name}: above 1, the peer takes more. The extras are"
-        " brickmend's proof and Blender's start.\n",
+        " brickmend's checks and Blender's start.\n",
         ratios(bench),
         "## Where the time goes\n",
         parts(bench),
@@ -146,8 +146,8 @@ def plot(bench, path):
     figure, (left, right) = plt.subplots(1, 2, figsize=(10, 4.8), layout="constrained")
     shown = [tool for tool in bench.tools if tool.kind != "start"]
     for tool, colour in zip(shown, COLOURS * len(shown)):
-        less = bench.without_proof if tool.kind == "own" else bench.without_start
-        extra = "without its proof" if tool.kind == "own" else "without its start"
+        less = bench.without_checks if tool.kind == "own" else bench.without_start
+        extra = "without its checks" if tool.kind == "own" else "without its start"
         style = {"color": colour, "marker": "o", "markersize": 4}
         draw(left, bench, tool.name, bench.cpu, {**style, "label": tool.name})
         if tool.kind == "own" or tool.starts:

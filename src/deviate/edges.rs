@@ -6,7 +6,7 @@
 //! Invariant:  two edges are one if and only if their ends are equal, exactly; copies of a triangle
 //!             count once. How the triangles face does not matter. Triangles without area have no
 //!             part in this.
-//! Memory:     three sixteenths of the share.
+//! Memory:     an eighth of the share.
 
 use bytemuck::{Pod, Zeroable};
 use glam::{DVec3, Vec3};
@@ -41,7 +41,7 @@ impl Record for EdgeUse {
 
 /// Finds the sharp edges of a surface.
 pub(crate) fn find_creases(tape: &Tape, means: &Means<'_>) -> Result<Creases, StoreError> {
-    let mut sorter = Sorter::new(means.scratch, means.share_bytes / 8);
+    let mut sorter = Sorter::new(means.scratch, means.share_bytes / 16);
     tape.triangles.each_block(BLOCK, |block| {
         means.stop_if_asked()?;
         for triangle in block {

@@ -48,9 +48,15 @@ impl Surface {
         }
         let bounds = tape.bounds;
         let samples = take_samples(&tape, options.samples, means)?;
-        let creases = options.creases.then(|| find_creases(&tape, means)).transpose()?;
-        let tree = tree_of(tape, options.is_coherent, means)?;
-        Ok(Some(Self { bounds, tree, samples, creases }))
+        if options.is_coherent || !options.creases {
+            let creases = options.creases.then(|| find_creases(&tape, means)).transpose()?;
+            let tree = tree_of(tape, options.is_coherent, means)?;
+            return Ok(Some(Self { bounds, tree, samples, creases }));
+        }
+        // Both sorts take their time on one thread.
+        let (creases, tree) =
+            means.pool.join(|| find_creases(&tape, means), || ordered_tree(&tape, means)?.finish());
+        Ok(Some(Self { bounds, tree: tree?, samples, creases: Some(creases?) }))
     }
 }
 
@@ -63,11 +69,17 @@ pub(crate) fn tree_of(
     if is_coherent {
         return Tree::around(tape.triangles, tape.bounds, means);
     }
+    let builder = ordered_tree(&tape, means)?;
+    drop(tape);
+    builder.finish()
+}
+
+/// The triangles of a tape on their way into a tree.
+fn ordered_tree<'m>(tape: &Tape, means: &'m Means<'m>) -> Result<TreeBuilder<'m>, StoreError> {
     let mut builder = TreeBuilder::new(tape.bounds, means);
     tape.triangles.each_block(BLOCK, |block| {
         means.stop_if_asked()?;
         block.iter().try_for_each(|triangle| builder.add(*triangle))
     })?;
-    drop(tape);
-    builder.finish()
+    Ok(builder)
 }

@@ -7,6 +7,8 @@
 //! Out:     [`LostHits`] by source number, from each brick on its own.
 //! Memory:  the share; a brick per worker.
 
+use glam::DVec3;
+
 use crate::octree::{
     ArchivedHitBrick, EdgeBits, Flips, HitEdge, LINES, LostHits, ROWS, Regions, SIDE, SourcePlane,
     decode_hits, edge_index, edge_position, find_regions,
@@ -108,16 +110,22 @@ fn neighbours(at: [usize; 3]) -> impl Iterator<Item = [usize; 3]> {
     })
 }
 
-/// Whether the first and the last hit lie on planes that could be the sides of a wall. Those of a
-/// ridge are no loss: every ridge passes edges whose ends are both outside.
-fn are_parallel(brick: &ArchivedHitBrick, hits: &[rkyv::rend::u32_le]) -> bool {
+/// Whether the first and the last hit of an edge lie on planes that could be the sides of a wall.
+fn are_of_wall(brick: &ArchivedHitBrick, hits: &[rkyv::rend::u32_le], axis: usize) -> bool {
     let (Some(first), Some(last)) = (hits.first(), hits.last()) else { return false };
     let normal = |hit: &rkyv::rend::u32_le| {
-        SourcePlane::from(&brick.planes[hit.to_native() as usize]).normal.map(f64::from)
+        SourcePlane::from(&brick.planes[hit.to_native() as usize]).unit_normal()
     };
-    let (a, b) = (normal(first), normal(last));
-    let cosine = a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
-    cosine.abs() >= PARALLEL
+    are_sides([normal(first), normal(last)], axis)
+}
+
+/// Whether planes that an edge crosses could be the sides of a wall. Those of a ridge are no loss:
+/// every ridge passes edges whose ends are both outside. Which way triangles face is not known; where
+/// both are made to look the same way, an edge crosses the sides of a wall alike, and of those of a
+/// blunt ridge one upward, one downward.
+fn are_sides([one, other]: [DVec3; 2], axis: usize) -> bool {
+    let cosine = one.dot(other);
+    cosine.abs() >= PARALLEL && one[axis] * other[axis] * cosine >= 0.0
 }
 
 /// Whether the four edges beside one are hit as well. What lies beyond the brick is not asked.
@@ -146,7 +154,7 @@ fn lost_of(
         beyond[axis] += 1;
         let hits = &brick.hits[hits];
         let is_lost = at.iter().all(|&c| c < SIDE) && is_outside(at) && is_outside(beyond);
-        if is_lost && are_parallel(brick, hits) {
+        if is_lost && are_of_wall(brick, hits, axis) {
             let inner = u32::from(is_inner(barrier, axis, at));
             for hit in hits {
                 let [count, within] = &mut counts[hit.to_native() as usize];
@@ -161,4 +169,24 @@ fn lost_of(
         LostHits { source, count, inner }
     });
     lost.collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn sides_of_walls_are_told_from_those_of_ridges_whichever_way_they_face() {
+        let wall = DVec3::new(0.1, 0.2, 0.97).normalize();
+        // Both sides of a roof, 12 degrees apart, along x.
+        let [left, right] = [-0.1, 0.1].map(|x| DVec3::new(x, 0.0, 1.0).normalize());
+        for turn in [1.0, -1.0] {
+            for axis in 0..3 {
+                assert!(are_sides([wall, turn * wall], axis));
+                assert!(are_sides([wall, turn * (wall + 0.05 * DVec3::Y).normalize()], axis));
+                assert_eq!(are_sides([left, turn * right], axis), axis != 0);
+            }
+            assert!(!are_sides([DVec3::X, turn * DVec3::new(0.7, 0.7, 0.0).normalize()], 0));
+        }
+    }
 }

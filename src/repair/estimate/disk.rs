@@ -441,7 +441,7 @@ impl DiskModel<'_> {
         let written = most.triangles as f64;
         let creases = |count: f64| spilled(MEASURED_CREASES_BYTES * count, 0.0, share / 16.0);
         let order = ORDER_BYTES / MEASURED_EDGES_BYTES;
-        let edges = spilled(MEASURED_EDGES_BYTES * triangles.max(written), order, share / 8.0);
+        let edges = spilled(MEASURED_EDGES_BYTES * triangles.max(written), order, share / 16.0);
         let creases = creases(triangles) + creases(written) + edges;
         2.0 * read(triangles) + sorted + read(written) + positions + samples + creases
     }

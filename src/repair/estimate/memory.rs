@@ -120,7 +120,7 @@ impl MemoryModel<'_> {
         let positions = POSITION_BYTES * self.counts.at_most.vertices as f64;
         let edges = GROWTH * MEASURED_EDGES_BYTES * (self.counts.at_most.triangles as f64);
         written.min(share / 7.0)
-            + edges.min(share / 6.0)
+            + edges.min(share / 8.0)
             + read.min(share / 3.0)
             + positions.min(share / 6.0)
             + SAMPLES_BYTES
