@@ -7,8 +7,9 @@ use brickmend::mesh::shapes::cuboid;
 use rustix::process::{Pid, Signal, kill_process};
 
 use crate::support::library::{
-    Library, SOUND, children_of, files_in, kill, obj_of, slow_library, start_slowly,
+    Library, SOUND, children_of, files_in, kill, slow_library, start_slowly,
 };
+use crate::support::obj::unwelded_obj;
 
 fn count(summary: &serde_json::Value, state: &str) -> u64 {
     let states = summary["states"].as_array().expect("a list");
@@ -41,7 +42,7 @@ fn a_folder_is_done_once_and_again_only_where_something_changed() {
     assert_eq!(library.attempts(), done, "nothing is done again");
 
     // Another content, a lost result, a spoiled one, a model that is gone, and a new one.
-    library.write("c/0.obj".as_ref(), &obj_of(&cuboid([0.0; 3], [2.0; 3])[1..]));
+    library.write("c/0.obj".as_ref(), &unwelded_obj(&cuboid([0.0; 3], [2.0; 3])[1..]));
     std::fs::remove_file(library.results().join("c/1.obj")).expect("there");
     std::fs::write(library.results().join("c/2.obj"), "spoiled").expect("writable");
     std::fs::remove_file(library.models().join("c/3.obj")).expect("there");

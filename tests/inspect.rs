@@ -2,7 +2,6 @@
 //! threads, and `docs/inspect.md` names every field.
 
 use std::collections::BTreeSet;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -16,6 +15,7 @@ use glam::DVec3;
 use tempfile::TempDir;
 
 use crate::support::breakage::Breakage;
+use crate::support::obj::unwelded_obj;
 use crate::support::program::Ended;
 use crate::support::schema::check_document;
 use crate::support::testdata;
@@ -31,18 +31,6 @@ fn limits(folder: &Path) -> Limits {
 fn inspected(model: &Path) -> Inspection {
     let folder = folder();
     inspect(model, &InspectSettings::default(), &limits(folder.path()), &Void).expect("readable")
-}
-
-/// OBJ, each triangle with vertices of its own.
-fn obj(triangles: &[Corners]) -> String {
-    let mut text = String::new();
-    for [x, y, z] in triangles.iter().flatten() {
-        writeln!(text, "v {x} {y} {z}").expect("text grows");
-    }
-    for at in 0..triangles.len() {
-        writeln!(text, "f {} {} {}", 3 * at + 1, 3 * at + 2, 3 * at + 3).expect("text grows");
-    }
-    text
 }
 
 fn inspected_text(text: &str) -> Inspection {
@@ -76,7 +64,7 @@ fn clean_shapes_are_sound_in_any_pose() {
     for shape in &shapes {
         for _ in 0..4 {
             let turned = transform(shape, rotation(&mut random), DVec3::new(10.0, -4.0, 2.5));
-            let found = inspected_text(&obj(&turned));
+            let found = inspected_text(&unwelded_obj(&turned));
             assert!(found.is_sound);
             let notes: Vec<_> = found.notes().map(|finding| finding.kind).collect();
             // Every triangle has vertices of its own.
@@ -101,7 +89,7 @@ fn every_breakage_is_found_under_its_name() {
         let mut soup = whole.clone();
         breakage.apply(&mut soup, 0.05, &mut random);
         let added = (soup.len() - whole.len().min(soup.len())) as u64;
-        let found = inspected_text(&obj(&soup));
+        let found = inspected_text(&unwelded_obj(&soup));
         let counts = |kind| count(&found, kind);
         let lost = whole.len().saturating_sub(soup.len()) as u64;
         match breakage {
@@ -156,7 +144,7 @@ fn every_breakage_is_found_under_its_name() {
 #[test]
 fn pairs_are_told_by_how_they_meet() {
     let kinds = |soup: &[Corners]| {
-        let found = inspected_text(&obj(soup));
+        let found = inspected_text(&unwelded_obj(soup));
         [
             DefectKind::IntersectingTriangles,
             DefectKind::OverlappingTriangles,
@@ -178,7 +166,7 @@ fn ball_in_box(dissolve: f64) -> Inspection {
     let folder = folder();
     let mut soup = cuboid([-1.0; 3], [1.0; 3]);
     soup.extend(sphere([0.0; 3], 0.5, 4));
-    let text = obj(&soup).replacen("f 1 2 3", "usemtl wall\nf 1 2 3", 1);
+    let text = unwelded_obj(&soup).replacen("f 1 2 3", "usemtl wall\nf 1 2 3", 1);
     let text = text.replacen("f 37 38 39", "usemtl ball\nf 37 38 39", 1);
     let model = folder.path().join("model.obj");
     std::fs::write(&model, format!("mtllib model.mtl\n{text}")).expect("writable");
@@ -228,7 +216,7 @@ fn menagerie() -> String {
     soup.extend(tetrahedron([-1.0, 0.0, 0.0], 0.01));
     soup.push([[f64::NAN; 3], [0.0; 3], [1.0; 3]]);
     let vertices = 3 * soup.len();
-    format!("{}v 1 2 3\nf 1 2 {}\nf 1 2\n", obj(&soup), vertices + 100)
+    format!("{}v 1 2 3\nf 1 2 {}\nf 1 2\n", unwelded_obj(&soup), vertices + 100)
 }
 
 #[test]
@@ -328,7 +316,7 @@ fn heap(random: &mut Random) -> Vec<Corners> {
 fn neither_memory_nor_threads_change_anything() {
     let folder = folder();
     let model = folder.path().join("heap.obj");
-    std::fs::write(&model, obj(&heap(&mut Random::new(35)))).expect("writable");
+    std::fs::write(&model, unwelded_obj(&heap(&mut Random::new(35)))).expect("writable");
     let look = |share_bytes: Option<u64>, threads: usize| {
         let limits = Limits { share_bytes, threads, ..limits(folder.path()) };
         let found = inspect(&model, &InspectSettings::default(), &limits, &Void);
@@ -351,7 +339,7 @@ fn memory_stays_within_the_budget() {
     let model = folder.path().join("ball.obj");
     // Its triangles alone, with what is noted of each, are larger than the budget.
     let ball = sphere([0.0; 3], 1.0, 200);
-    std::fs::write(&model, obj(&ball)).expect("writable");
+    std::fs::write(&model, unwelded_obj(&ball)).expect("writable");
     let mut command = Command::new(env!("CARGO_BIN_EXE_brickmend"));
     command.args(["inspect", "-q", "--max-memory", "64MiB", "-j", "2", "--work-dir"]);
     let mut child = command.arg(folder.path()).arg(&model).spawn().expect("the program starts");
@@ -398,12 +386,12 @@ fn files_that_lie_are_one_clear_line() {
     for scale in [1e-300, 1e-30, 1e30, 1e150, 1e300] {
         let soup: Vec<Corners> =
             cuboid([0.0; 3], [1.0; 3]).iter().map(|t| t.map(|p| p.map(|x| x * scale))).collect();
-        let found = inspected_text(&obj(&soup));
+        let found = inspected_text(&unwelded_obj(&soup));
         assert_eq!((found.shells.closed, found.shells.count), (1, 1), "{scale}");
         let harmful: Vec<_> = found.defects().map(|finding| finding.kind).collect();
         assert_eq!(harmful, [], "{scale}");
     }
-    let nan = inspected_text(&obj(&[[[f64::NAN; 3]; 3]]));
+    let nan = inspected_text(&unwelded_obj(&[[[f64::NAN; 3]; 3]]));
     assert!(!nan.is_sound && nan.repair.is_none() && nan.size.bounds.is_none());
     assert!(matches!(nan.findings[0].places[0], Defect::NonfiniteTriangle(_)));
 }

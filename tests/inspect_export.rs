@@ -1,8 +1,7 @@
 //! Exports of an inspection: exactly the points, edges and triangles with a defect, the same bytes for
 //! any number of threads and any memory.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::fmt::Write;
+use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::Command;
 
@@ -12,32 +11,13 @@ use brickmend::monitor::Void;
 use brickmend::repair::{InspectSettings, Limits, inspect_exporting};
 
 use crate::support::breakage::Breakage;
+use crate::support::obj::welded_obj;
 use crate::support::program::Ended;
 
 const LIMITS: [[&str; 2]; 3] = [["1", "64MiB"], ["4", "64MiB"], ["4", "1GiB"]];
 
-/// OBJ in which corners in one place are one vertex.
-pub fn obj(triangles: &[Corners]) -> String {
-    let (mut vertices, mut faces) = (String::new(), String::new());
-    let mut numbers = BTreeMap::new();
-    for corners in triangles {
-        faces.push('f');
-        for corner in corners {
-            let next = numbers.len() + 1;
-            let number = *numbers.entry(corner.map(f64::to_bits)).or_insert_with(|| {
-                let [x, y, z] = corner;
-                writeln!(vertices, "v {x} {y} {z}").expect("text grows");
-                next
-            });
-            write!(faces, " {number}").expect("text grows");
-        }
-        faces.push('\n');
-    }
-    vertices + &faces
-}
-
 fn write_obj(path: &Path, triangles: &[Corners]) {
-    std::fs::write(path, obj(triangles)).expect("writable");
+    std::fs::write(path, welded_obj(triangles)).expect("writable");
 }
 
 fn export(model: &Path, folder: &Path, [threads, memory]: [&str; 2]) -> Ended {
@@ -109,7 +89,7 @@ fn points(shapes: &[(Vec<[f64; 3]>, u32)]) -> Vec<[f64; 3]> {
 
 /// Exports under all limits; answers the files, which are the same each time.
 fn exported(model: &[Corners], expected: &[&str]) -> tempfile::TempDir {
-    exported_text(&obj(model), expected)
+    exported_text(&welded_obj(model), expected)
 }
 
 /// The same of a file with this text.
@@ -303,7 +283,7 @@ fn every_kind_that_is_told_is_exported_as_often_as_it_is_told() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let (path, out) = (folder.path().join("model.obj"), folder.path().join("out"));
     let lonely = "v 7 7 7\nv 7 7 7.5\n";
-    std::fs::write(&path, obj(&broken(24)) + lonely).expect("writable");
+    std::fs::write(&path, welded_obj(&broken(24)) + lonely).expect("writable");
     let limits = Limits { work_dir: Some(folder.path().to_path_buf()), ..Limits::default() };
     let settings = InspectSettings::default();
     let found = inspect_exporting(&path, &settings, Some(&out), &limits, &Void).expect("readable");
@@ -336,7 +316,7 @@ fn exports_that_outgrow_memory_are_the_same() {
     let folder = tempfile::tempdir().expect("a temporary folder");
     let path = folder.path().join("model.obj");
     let lonely: String = (0..4000).map(|i| format!("v 3 3 {i}\n")).collect();
-    std::fs::write(&path, obj(&broken(48)) + &lonely).expect("writable");
+    std::fs::write(&path, welded_obj(&broken(48)) + &lonely).expect("writable");
     let export = |name: &str, share_bytes: Option<u64>, threads: usize| {
         let out = folder.path().join(name);
         let work_dir = Some(folder.path().to_path_buf());

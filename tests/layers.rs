@@ -12,7 +12,7 @@ use brickmend::store::Scratch;
 use serde_json::Value;
 use tempfile::TempDir;
 
-use crate::inspect_export::obj;
+use crate::support::obj::welded_obj;
 use crate::support::program::{self, Ended};
 
 /// A model, and a folder for layers.
@@ -22,7 +22,7 @@ struct Bench {
 
 impl Bench {
     fn new(model: &[Corners]) -> Self {
-        Self::of_text(&obj(model))
+        Self::of_text(&welded_obj(model))
     }
 
     fn of_text(text: &str) -> Self {

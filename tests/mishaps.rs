@@ -8,7 +8,8 @@ use std::time::{Duration, Instant};
 use brickmend::mesh::shapes::torus;
 use rustix::process::{Pid, Resource, Rlimit, Signal, kill_process, prlimit};
 
-use crate::support::library::{Library, children_of, files_in, obj_of, slow_library, start_slowly};
+use crate::support::library::{Library, children_of, files_in, slow_library, start_slowly};
+use crate::support::obj::unwelded_obj;
 
 /// The worker of a batch that has one, once it is bound to its parent and listens to signals.
 fn worker_of(batch: &mut Child) -> Pid {
@@ -204,7 +205,7 @@ fn a_disk_that_is_full_stops_the_batch_until_there_is_room() {
 fn a_model_that_changes_while_it_is_worked_on_ends_as_it_is_in_the_end() {
     let library = slow_library();
     let mut batch = start_slowly(&library);
-    let other = obj_of(&torus(1.0, 0.3, 30, 20)[2..]);
+    let other = unwelded_obj(&torus(1.0, 0.3, 30, 20)[2..]);
     // In place and in two parts, as an editor does that saves.
     library.write(Path::new("slow.obj"), &other[..other.len() / 2]);
     library.write(Path::new("slow.obj"), &other);

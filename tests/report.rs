@@ -1,7 +1,6 @@
 //! The pages of a report, as text and, where a browser is named, clicked through.
 
 use std::ffi::OsStr;
-use std::fmt::Write;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -9,6 +8,7 @@ use std::process::Command;
 use brickmend::mesh::shapes::{cuboid, sphere};
 use tempfile::TempDir;
 
+use crate::support::obj::unwelded_obj;
 use crate::support::page::{Page, file_at};
 
 /// Names that would like to be something else.
@@ -84,14 +84,7 @@ fn code_of(command: &mut Command) -> i32 {
 }
 
 fn obj_of(triangles: &[[[f64; 3]; 3]]) -> String {
-    let mut text = String::from("o <part>\"&'\n");
-    for [x, y, z] in triangles.iter().flatten() {
-        writeln!(text, "v {x} {y} {z}").expect("text grows");
-    }
-    for first in (1..=3 * triangles.len()).step_by(3) {
-        writeln!(text, "f {first} {} {}", first + 1, first + 2).expect("text grows");
-    }
-    text
+    format!("o <part>\"&'\n{}", unwelded_obj(triangles))
 }
 
 /// Every link and picture of the page leads to a file that is there.

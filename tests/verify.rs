@@ -1,8 +1,6 @@
 //! Verifications: clean repairs pass, each way to spoil one is told by its own reason, nothing depends
 //! on memory or threads, and `docs/verify.md` names every field.
 
-use std::collections::HashMap;
-use std::fmt::Write;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -18,32 +16,13 @@ use brickmend::store::Scratch;
 use glam::DVec3;
 use tempfile::TempDir;
 
+use crate::support::obj::welded_obj;
 use crate::support::program::Ended;
 use crate::support::schema::check_document;
 use crate::support::testdata;
 
 fn folder() -> TempDir {
     tempfile::tempdir().expect("a temporary folder can be made")
-}
-
-/// OBJ, one vertex for each place.
-fn obj(triangles: &[Corners]) -> String {
-    let mut numbers = HashMap::new();
-    let (mut vertices, mut faces) = (String::new(), String::new());
-    for corners in triangles {
-        faces.push('f');
-        for corner in corners {
-            let next = numbers.len() + 1;
-            let number = *numbers.entry(corner.map(|x| (x + 0.0).to_bits())).or_insert(next);
-            if number == next {
-                let [x, y, z] = corner;
-                writeln!(vertices, "v {x} {y} {z}").expect("text grows");
-            }
-            write!(faces, " {number}").expect("text grows");
-        }
-        faces.push('\n');
-    }
-    vertices + &faces
 }
 
 /// A folder with a file and its original.
@@ -54,8 +33,8 @@ struct Pair {
 impl Pair {
     fn new(file: &[Corners], original: &[Corners]) -> Self {
         let pair = Self { folder: folder() };
-        std::fs::write(pair.file(), obj(file)).expect("writable");
-        std::fs::write(pair.original(), obj(original)).expect("writable");
+        std::fs::write(pair.file(), welded_obj(file)).expect("writable");
+        std::fs::write(pair.original(), welded_obj(original)).expect("writable");
         pair
     }
 
@@ -409,7 +388,7 @@ const CONDITIONAL: [&str; 9] = [
 fn the_documentation_names_every_field_and_no_other() {
     let ball = sphere([0.0; 3], 1.0, 6);
     let pair = Pair::new(&ball[2..], &cuboid([-1.0; 3], [1.0; 3]));
-    std::fs::write(pair.original(), obj(&cuboid([-1.0; 3], [1.0; 3]))).expect("writable");
+    std::fs::write(pair.original(), welded_obj(&cuboid([-1.0; 3], [1.0; 3]))).expect("writable");
     let found = pair.verified(&Limits::default());
     let mut json = serde_json::to_value(&found).expect("plain data is always JSON");
     assert_eq!(json["schema"], VERIFICATION_VERSION);
@@ -504,7 +483,7 @@ fn an_export_never_replaces_what_is_compared() {
     let ended = program(&["file.obj", "--against", "original.obj", "--export", "."], &pair);
     assert_eq!(ended.code, Some(5), "{}", ended.stderr);
     assert!(ended.stderr.contains("choose another folder"), "{}", ended.stderr);
-    assert_eq!(std::fs::read_to_string(pair.file()).expect("there"), obj(&cube));
+    assert_eq!(std::fs::read_to_string(pair.file()).expect("there"), welded_obj(&cube));
 }
 
 #[test]

@@ -41,8 +41,8 @@ pub fn find_walls(
     walls
 }
 
-/// Whether more crossings of the face speak for a wall than for a gap, and its sides look away from
-/// each other.
+/// Whether more crossings of the face speak for a wall than for a gap, and two of its sides look away
+/// from each other.
 fn is_walled(
     brick: &SignBrick,
     signs: &CornerBits,

@@ -2,12 +2,12 @@
 
 use std::collections::BTreeMap;
 use std::ffi::OsStr;
-use std::fmt::Write;
 use std::os::unix::ffi::OsStrExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
+use crate::support::obj::unwelded_obj;
 use brickmend::catalogue::Journal;
 use brickmend::mesh::shapes::{cuboid, sphere, torus};
 use rustix::process::Pid;
@@ -24,16 +24,16 @@ impl Library {
         let library = Self { folder: tempfile::tempdir().expect("a temporary folder") };
         let open = &cuboid([0.0; 3], [1.0, 2.0, 3.0])[2..];
         let ball = sphere([0.0; 3], 1.0, 6);
-        library.write("a/open.obj".as_ref(), &obj_of(open));
-        library.write("a/deep er/ball.OBJ".as_ref(), &obj_of(&ball[1..]));
-        library.write(OsStr::from_bytes(b"a/na\xffme.obj").as_ref(), &obj_of(open));
+        library.write("a/open.obj".as_ref(), &unwelded_obj(open));
+        library.write("a/deep er/ball.OBJ".as_ref(), &unwelded_obj(&ball[1..]));
+        library.write(OsStr::from_bytes(b"a/na\xffme.obj").as_ref(), &unwelded_obj(open));
         library.write("b/sound.off".as_ref(), SOUND);
         library.write("b/torn.obj".as_ref(), "v 0 0 0\nf 1 2 3\n");
         library.write("b/notes.txt".as_ref(), "no model");
         for number in 0..6 {
             let corner = [f64::from(number), 0.0, 0.0];
             let cube = cuboid(corner, [f64::from(number) + 1.0, 1.0, 1.0]);
-            library.write(format!("c/{number}.obj").as_ref(), &obj_of(&cube[1..]));
+            library.write(format!("c/{number}.obj").as_ref(), &unwelded_obj(&cube[1..]));
         }
         library
     }
@@ -88,17 +88,6 @@ impl Library {
 pub const SOUND: &str =
     "OFF\n4 4 6\n0 0 0\n1 0 0\n0 1 0\n0 0 1\n3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n";
 
-pub fn obj_of(triangles: &[[[f64; 3]; 3]]) -> String {
-    let mut text = String::new();
-    for [x, y, z] in triangles.iter().flatten() {
-        writeln!(text, "v {x} {y} {z}").expect("text grows");
-    }
-    for first in (1..=3 * triangles.len()).step_by(3) {
-        writeln!(text, "f {first} {} {}", first + 1, first + 2).expect("text grows");
-    }
-    text
-}
-
 /// All files below a folder with their bytes, but for the catalogue's own.
 pub fn files_in(folder: &Path) -> BTreeMap<PathBuf, Vec<u8>> {
     let mut files = BTreeMap::new();
@@ -129,7 +118,7 @@ pub fn kill(child: &mut Child) {
 /// One model that takes a while.
 pub fn slow_library() -> Library {
     let library = Library { folder: tempfile::tempdir().expect("a temporary folder") };
-    library.write("slow.obj".as_ref(), &obj_of(&torus(1.0, 0.4, 60, 30)[1..]));
+    library.write("slow.obj".as_ref(), &unwelded_obj(&torus(1.0, 0.4, 60, 30)[1..]));
     library
 }
 

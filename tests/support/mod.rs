@@ -4,6 +4,7 @@ pub mod breakage;
 pub mod disk_watch;
 pub mod image;
 pub mod library;
+pub mod obj;
 pub mod page;
 pub mod program;
 pub mod run;

@@ -11,6 +11,7 @@ use brickmend::repair::{Depth, Limits, Outcome, Reach, RepairError, Settings, re
 use brickmend::sign::FillRule;
 use tempfile::TempDir;
 
+use crate::support::obj::unwelded_obj;
 use crate::support::surface::Surface;
 
 /// How a soup is written.
@@ -104,7 +105,7 @@ impl Workshop {
         let (extension, bytes) = match encoding {
             Encoding::BinaryStl => ("stl", binary_stl(soup)),
             Encoding::AsciiStl => ("stl", ascii_stl(soup).into_bytes()),
-            Encoding::Obj => ("obj", obj(soup).into_bytes()),
+            Encoding::Obj => ("obj", unwelded_obj(soup).into_bytes()),
         };
         let path = self.path("soup", extension);
         std::fs::write(&path, bytes).expect("the folder is writable");
@@ -155,17 +156,5 @@ fn ascii_stl(soup: &[Corners]) -> String {
         text.push_str("endloop\nendfacet\n");
     }
     text.push_str("endsolid soup\n");
-    text
-}
-
-fn obj(soup: &[Corners]) -> String {
-    let mut text = String::new();
-    for [x, y, z] in soup.iter().flatten() {
-        writeln!(text, "v {x} {y} {z}").expect("strings grow");
-    }
-    for number in 0..soup.len() {
-        let first = 3 * number;
-        writeln!(text, "f {} {} {}", first + 1, first + 2, first + 3).expect("strings grow");
-    }
     text
 }

@@ -93,7 +93,7 @@ const MEASURED_BYTES: f64 = 80.0;
 const MEASURED_SORT_BYTES: f64 = 96.0;
 const BOX_BYTES: f64 = 48.0 / 7.0;
 /// The edges of a triangle while sharp ones are sought, and all of them sharp.
-const MEASURED_EDGES_BYTES: f64 = 3.0 * 24.0;
+pub const MEASURED_EDGES_BYTES: f64 = 3.0 * 24.0;
 const MEASURED_CREASES_BYTES: f64 = 1.5 * 96.0;
 /// Samples and corners of a surface, sorted and in order, and their distances.
 const MEASURED_SAMPLES_BYTES: f64 = 2.0 * SAMPLES as f64 * (2.0 * 112.0 + 16.0);

@@ -7,7 +7,9 @@ use crate::ingest::SoupSums;
 use crate::io::Format;
 use crate::mesh::Attributes;
 use crate::repair::estimate::counts::Counts;
-use crate::repair::estimate::disk::{CELL_TRIANGLE_BYTES, FAN_BYTES, FileSizes, SMALL_BIN};
+use crate::repair::estimate::disk::{
+    CELL_TRIANGLE_BYTES, FAN_BYTES, FileSizes, MEASURED_EDGES_BYTES, SMALL_BIN,
+};
 use crate::repair::measuring::SAMPLES;
 use crate::repair::plan::{MemoryPlan, WINDOW_BYTES};
 
@@ -41,8 +43,6 @@ const MOST_JOINED: f64 = 16_384.0;
 /// their distances.
 const MEASURED_BYTES: f64 = 90.0;
 const MEASURED_SORT_BYTES: f64 = 220.0;
-/// Its edges, while sharp ones are sought.
-const MEASURED_EDGES_BYTES: f64 = 72.0;
 const SAMPLES_BYTES: f64 = 4.0 * SAMPLES as f64 * 300.0;
 /// What an allocator keeps of the lists of early steps; larger ones go back at once.
 const RETAINED_BYTES: f64 = (32_u32 << 20) as f64;
