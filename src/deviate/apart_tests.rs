@@ -12,7 +12,7 @@ const AMPLE: u64 = 64 << 20;
 const SMALL: u64 = 16 << 10;
 
 fn apart_with(
-    (threads, share_bytes, is_coherent): (usize, u64, bool),
+    (threads, share_bytes): (usize, u64),
     (one, other): (&[Corners], &[Corners]),
     gap: Gap,
 ) -> Vec<Piece> {
@@ -21,7 +21,7 @@ fn apart_with(
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
     let means = Means { scratch: &scratch, pool: &pool, share_bytes, monitor: &Void };
     let mut source = ListedTriangles::without_indices(other.to_vec());
-    let target = Target::read(&mut source, is_coherent, &means).expect("the disk works");
+    let target = Target::read(&mut source, &means).expect("the disk works");
     let target = target.expect("it has an area");
     let mut source = ListedTriangles::without_indices(one.to_vec());
     let mut pieces = Vec::new();
@@ -35,7 +35,7 @@ fn apart_with(
 }
 
 fn apart(one: &[Corners], other: &[Corners], tolerance: f64, finest: f64) -> Vec<Piece> {
-    apart_with((1, AMPLE, false), (one, other), Gap { tolerance, finest })
+    apart_with((1, AMPLE), (one, other), Gap { tolerance, finest })
 }
 
 fn area(pieces: &[Piece]) -> f64 {
@@ -96,9 +96,9 @@ fn threads_shares_and_the_order_of_the_tree_change_nothing() {
     one.insert(7, [[-2.0, -2.0, 0.1], [2.0, -2.0, 0.0], [0.0, 2.0, 0.2]]);
     let other = soup(&mut random, 100, 0.1);
     let gap = Gap { tolerance: 0.05, finest: 0.02 };
-    let expected = apart_with((1, AMPLE, false), (&one, &other), gap);
+    let expected = apart_with((1, AMPLE), (&one, &other), gap);
     assert!(expected.iter().filter(|piece| piece.number == 7).count() > 100);
-    for means in [(2, AMPLE, false), (8, SMALL, false), (1, SMALL, true), (3, AMPLE, true)] {
+    for means in [(2, AMPLE), (8, SMALL), (1, SMALL), (3, AMPLE)] {
         assert_eq!(apart_with(means, (&one, &other), gap), expected, "{means:?}");
     }
 }

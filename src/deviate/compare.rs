@@ -37,7 +37,7 @@ pub fn compare(
     let back = Tally::measure((file, original), false, options, means)?;
     let creases = match (&original.creases, &file.creases) {
         (Some(before), Some(now)) => {
-            Some(compare_creases((original, before), (file, now), options, means)?)
+            Some(compare_creases((original, before), now, options, means)?)
         }
         _ => None,
     };
@@ -224,7 +224,7 @@ fn answer(space: &mut Space<'_>, sample: Sample, tolerance: f64) -> Result<Answe
 /// Follows the sharp edges of the original along those of the file.
 fn compare_creases(
     (original, before): (&Surface, &Creases),
-    (file, now): (&Surface, &Creases),
+    now: &Creases,
     options: &DeviationOptions,
     means: &Means<'_>,
 ) -> Result<CreaseReport, StoreError> {
@@ -238,7 +238,7 @@ fn compare_creases(
     if report.length == 0.0 {
         return Ok(report);
     }
-    let tree = now.tree(file.bounds, means)?;
+    let tree = now.tree(means)?;
     let samples = before.samples(original.bounds, options.crease_samples, means)?;
     let mut samples = samples.finish()?;
     let (mut all, mut seen, mut kept) = (0_u64, 0_u64, 0_u64);

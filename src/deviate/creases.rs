@@ -6,9 +6,9 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::Means;
-use crate::deviate::reading::{BLOCK, Triangle};
+use crate::deviate::reading::{BLOCK, TapeWriter};
 use crate::deviate::samples::Spread;
-use crate::deviate::tree::{Curve, Tree, TreeBuilder};
+use crate::deviate::tree::{Curve, Tree};
 use crate::store::{Record, Sequence, Sorter, StoreError};
 
 /// Square of the cosine of 30 degrees.
@@ -63,21 +63,14 @@ impl Creases {
     }
 
     /// A tree around them, as triangles with two corners in one place.
-    pub(crate) fn tree(
-        &self,
-        bounds: [[f64; 3]; 2],
-        means: &Means<'_>,
-    ) -> Result<Tree, StoreError> {
-        let mut builder = TreeBuilder::new(bounds, means);
-        let mut number = 0;
+    pub(crate) fn tree(&self, means: &Means<'_>) -> Result<Tree, StoreError> {
+        let mut tape = TapeWriter::new(means);
         self.list.each_block(BLOCK, |block| {
-            for Crease { ends: [from, to], .. } in block {
-                builder.add(Triangle { corners: [*from, *to, *to], number, is_pane: 0 })?;
-                number += 1;
-            }
-            Ok(())
+            means.stop_if_asked()?;
+            let mut ends = block.iter().map(|crease| crease.ends);
+            ends.try_for_each(|[from, to]| tape.push(&[from, to, to], false).map(drop))
         })?;
-        builder.finish()
+        Tree::around(tape.finish()?, means)
     }
 
     /// About `count` samples evenly spread over their length.

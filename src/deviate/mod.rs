@@ -10,8 +10,9 @@
 //!             not on threads. The distance of a sample is that to the nearest of all triangles.
 //! Units:      model units, the same in both files; angles in degrees.
 //! Memory:     about half of the share for each surface while it is read, half for both together
-//!             while they are compared; beyond that, scratch files without names: 96 bytes a
-//!             triangle, and 72 more while sharp edges are sought.
+//!             while they are compared; beyond that, scratch files without names: 108 bytes a
+//!             triangle, 300 where none lies beside the one before it in the file, and up to 96 more
+//!             while sharp edges are sought.
 //! Fails:      [`DeviateError`]: a source, the scratch disk, or a request to stop. Surfaces that
 //!             have no area, or are too large for their squares, give no deviation.
 //! Source:     Cignoni, Rocchini, Scopigno 1998, Metro (distances by samples); Roussopoulos, Kelley,
@@ -32,6 +33,7 @@ mod parts;
 mod pieces;
 mod quantiles;
 mod reading;
+mod runs;
 mod samples;
 mod sight;
 mod surface;

@@ -4,7 +4,7 @@ use glam::DVec3;
 
 use crate::deviate::pages::Pages;
 use crate::deviate::reading::Triangle;
-use crate::deviate::tree::{Bounds, GROUP, Tree};
+use crate::deviate::tree::{Bounds, Node, Tree};
 use crate::geom::{are_within, closest_on_triangle};
 use crate::store::StoreError;
 
@@ -88,12 +88,29 @@ impl Around {
     }
 }
 
+/// What a box has in it, while it waits to be looked at.
+#[derive(Clone, Copy)]
+struct Open {
+    /// Of the distance to what is in it, at least.
+    bound: f64,
+    /// Level of the box; what is in the lowest ones are triangles.
+    level: u32,
+    first: u32,
+    count: u32,
+}
+
+impl Open {
+    fn new(bound: f64, level: u32, node: &Node) -> Self {
+        Self { bound, level, first: node.first, count: node.count }
+    }
+}
+
 /// A walker of one tree; each worker has its own.
 pub(crate) struct Walker<'t> {
     triangles: Pages<'t, Triangle>,
-    levels: Vec<Pages<'t, Bounds>>,
-    /// Nodes to look at: the bound of their distance, level and number.
-    stack: Vec<(f64, usize, u64)>,
+    levels: Vec<Pages<'t, Node>>,
+    /// Boxes to look into, the next one last.
+    stack: Vec<Open>,
     /// What the last point had nearest: a good guess for the next.
     last: Option<Triangle>,
 }
@@ -120,12 +137,12 @@ impl<'t> Walker<'t> {
         let mut best = self.last.and_then(guess);
         let farthest = |best: &Option<Near>| best.map_or(f64::INFINITY, |b| b.distance_squared);
         self.start();
-        while let Some((bound, level, node)) = self.stack.pop() {
-            if bound > farthest(&best) {
+        while let Some(open) = self.stack.pop() {
+            if open.bound > farthest(&best) {
                 continue;
             }
-            if level == 0 {
-                for triangle in self.triangles.group(node * GROUP)? {
+            if open.level == 0 {
+                for triangle in self.triangles.group(open.first, open.count)? {
                     let near = near_on(point, normal, triangle, farthest(&best));
                     best = match (best, near) {
                         (Some(best), Some(near)) if !near.goes_before(&best) => Some(best),
@@ -134,16 +151,10 @@ impl<'t> Walker<'t> {
                 }
                 continue;
             }
-            let from = self.stack.len();
-            for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
-            {
-                let bound = bounds.distance_squared(point);
-                if bound <= farthest(&best) {
-                    self.stack.push((bound, level - 1, child));
-                }
-            }
-            // The nearest is the next.
-            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+            let most = farthest(&best);
+            self.enter(&open, |bounds| {
+                Some(bounds.distance_squared(point)).filter(|b| *b <= most)
+            })?;
         }
         self.last = best.map(|best| best.triangle);
         Ok(best)
@@ -171,24 +182,17 @@ impl<'t> Walker<'t> {
         };
         let mut found = self.last.is_some_and(|last| is_settled(&last, &mut bound_squared));
         self.start();
-        while !found && let Some((bound, level, node)) = self.stack.pop() {
-            if bound > bound_squared {
+        while !found && let Some(open) = self.stack.pop() {
+            if open.bound > bound_squared {
                 continue;
             }
-            if level == 0 {
-                let mut triangles = self.triangles.group(node * GROUP)?.iter();
+            if open.level == 0 {
+                let mut triangles = self.triangles.group(open.first, open.count)?.iter();
                 found = triangles.any(|triangle| is_settled(triangle, &mut bound_squared));
                 continue;
             }
-            let from = self.stack.len();
-            for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
-            {
-                let bound = bounds.distance_squared(point);
-                if bound <= bound_squared {
-                    self.stack.push((bound, level - 1, child));
-                }
-            }
-            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+            let near = |b: &f64| *b <= bound_squared;
+            self.enter(&open, |bounds| Some(bounds.distance_squared(point)).filter(near))?;
         }
         self.last = nearest;
         Ok(match nearest {
@@ -210,9 +214,9 @@ impl<'t> Walker<'t> {
             reach,
         };
         self.start();
-        while let Some((_, level, node)) = self.stack.pop() {
-            if level == 0 {
-                for triangle in self.triangles.group(node * GROUP)? {
+        while let Some(open) = self.stack.pop() {
+            if open.level == 0 {
+                for triangle in self.triangles.group(open.first, open.count)? {
                     if are_within(reach, piece, &triangle.points()) {
                         self.last = Some(*triangle);
                         return Ok(true);
@@ -220,12 +224,7 @@ impl<'t> Walker<'t> {
                 }
                 continue;
             }
-            let children = self.levels[level - 1].group(node * GROUP)?;
-            for (child, bounds) in (node * GROUP..).zip(children) {
-                if around.meets(bounds) {
-                    self.stack.push((0.0, level - 1, child));
-                }
-            }
+            self.enter(&open, |bounds| around.meets(bounds).then_some(0.0))?;
         }
         Ok(false)
     }
@@ -243,34 +242,43 @@ impl<'t> Walker<'t> {
     ) -> Result<Option<Triangle>, StoreError> {
         let inverse = direction.recip();
         self.start();
-        while let Some((_, level, node)) = self.stack.pop() {
-            if level == 0 {
-                for triangle in self.triangles.group(node * GROUP)? {
+        while let Some(open) = self.stack.pop() {
+            if open.level == 0 {
+                for triangle in self.triangles.group(open.first, open.count)? {
                     if triangle.is_pane == 0 && is_met(origin, direction, triangle) {
                         return Ok(Some(*triangle));
                     }
                 }
                 continue;
             }
-            let from = self.stack.len();
-            for (child, bounds) in (node * GROUP..).zip(self.levels[level - 1].group(node * GROUP)?)
-            {
-                if let Some(enter) = bounds.entered(origin, inverse) {
-                    self.stack.push((enter, level - 1, child));
-                }
-            }
             // What stops the ray is near more often than not.
-            self.stack[from..].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
+            self.enter(&open, |bounds| bounds.entered(origin, inverse))?;
         }
         Ok(None)
     }
 
+    /// Begins with all boxes of the highest level, which is one; of an empty tree there is none.
     fn start(&mut self) {
         self.stack.clear();
-        // Of an empty tree there is no box.
-        if let Some(top) = self.levels.len().checked_sub(1) {
-            self.stack.push((0.0, top, 0));
+        let level = self.levels.len() as u32;
+        self.stack.extend((level > 0).then_some(Open { bound: 0.0, level, first: 0, count: 1 }));
+    }
+
+    /// Puts the boxes within one onto the stack that `bound` is told of, the nearest last.
+    #[inline]
+    fn enter(
+        &mut self,
+        open: &Open,
+        bound: impl Fn(&Bounds) -> Option<f64>,
+    ) -> Result<(), StoreError> {
+        let (from, level) = (self.stack.len(), open.level - 1);
+        for node in self.levels[level as usize].group(open.first, open.count)? {
+            if let Some(bound) = bound(&node.bounds) {
+                self.stack.push(Open::new(bound, level, node));
+            }
         }
+        self.stack[from..].sort_unstable_by(|a, b| b.bound.total_cmp(&a.bound));
+        Ok(())
     }
 }
 

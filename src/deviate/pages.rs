@@ -6,7 +6,7 @@ use crate::deviate::tree::GROUP;
 use crate::store::{Sequence, StoreError};
 
 /// Records of a page, some groups.
-const PAGE: u64 = 8 * GROUP;
+pub(crate) const PAGE: u64 = 8 * GROUP;
 
 /// A reader of groups; each worker has its own.
 pub(crate) struct Pages<'s, R: Pod> {
@@ -25,10 +25,12 @@ impl<'s, R: Pod> Pages<'s, R> {
         Self { sequence, slots: vec![(u64::MAX, Vec::new()); count], room: Vec::new() }
     }
 
-    /// The group that begins at record `start`, fewer at the end.
-    pub(crate) fn group(&mut self, start: u64) -> Result<&[R], StoreError> {
+    /// The `count` records from number `start` on, which lie on one page.
+    #[inline]
+    pub(crate) fn group(&mut self, start: u32, count: u32) -> Result<&[R], StoreError> {
+        let (start, count) = (u64::from(start), count as usize);
         if self.slots.is_empty() {
-            return self.sequence.block(start, GROUP as usize, &mut self.room);
+            return self.sequence.block(start, count, &mut self.room);
         }
         let page = start / PAGE;
         let slot = (page % self.slots.len() as u64) as usize;
@@ -46,6 +48,6 @@ impl<'s, R: Pod> Pages<'s, R> {
         }
         let records = &self.slots[slot].1;
         let from = (start - page * PAGE) as usize;
-        Ok(&records[from..records.len().min(from + GROUP as usize)])
+        Ok(&records[from..from + count])
     }
 }

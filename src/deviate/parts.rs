@@ -11,10 +11,10 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::nearest::Walker;
-use crate::deviate::reading::{BLOCK, Tape, Triangle, read_with};
+use crate::deviate::reading::{BLOCK, Tape, Triangle, read};
 use crate::deviate::samples::{Spread, point_within};
 use crate::deviate::sight::Sight;
-use crate::deviate::tree::{Curve, Tree, TreeBuilder};
+use crate::deviate::tree::{Curve, Tree};
 use crate::deviate::{DeviateError, Means};
 use crate::mesh::MeshSource;
 use crate::store::{Sequence, StoreError, Table, ordered};
@@ -46,7 +46,7 @@ impl PartsSeen {
         means: &Means<'_>,
     ) -> Result<Self, DeviateError<S::Error>> {
         let mut extents = Table::<Extent>::new(means.scratch, means.share_bytes / 32);
-        let tape = read_with(source, means, |part, triangle| {
+        let tape = read(source, means, |part, triangle| {
             let part = u64::from(part);
             while extents.len() <= part {
                 extents.push(Extent { first: u64::from(triangle.number), ..Extent::zeroed() })?;
@@ -57,7 +57,7 @@ impl PartsSeen {
         })?;
         let mut hidden = Table::new(means.scratch, means.share_bytes / 32);
         if tape.is_measurable() {
-            look(&tape, extents, &mut hidden, means)?;
+            look(tape, extents, &mut hidden, means)?;
         }
         Ok(Self { hidden })
     }
@@ -74,17 +74,13 @@ impl PartsSeen {
 
 /// Looks at all parts, in order.
 fn look(
-    tape: &Tape,
+    tape: Tape,
     mut extents: Table<Extent>,
     hidden: &mut Table<u8>,
     means: &Means<'_>,
 ) -> Result<(), StoreError> {
-    let mut builder = TreeBuilder::new(tape.bounds, means);
-    tape.triangles.each_block(BLOCK, |block| {
-        means.stop_if_asked()?;
-        block.iter().try_for_each(|triangle| builder.add(*triangle))
-    })?;
-    let tree = builder.finish()?;
+    let bounds = tape.bounds;
+    let tree = Tree::around(tape, means)?;
     let mut part = 0;
     ordered(
         means.pool,
@@ -96,7 +92,7 @@ fn look(
             part += 1;
             extents.get(part - 1).map(Some)
         },
-        || Looker::new(&tree, tape, means),
+        || Looker::new(&tree, bounds, means),
         |looker, extent| looker.is_hidden(extent),
         |is_hidden| hidden.push(u8::from(is_hidden)),
     )
@@ -110,11 +106,11 @@ struct Looker<'t> {
 }
 
 impl<'t> Looker<'t> {
-    fn new(tree: &'t Tree, tape: &'t Tape, means: &Means<'_>) -> Self {
+    fn new(tree: &'t Tree, bounds: [[f64; 3]; 2], means: &Means<'_>) -> Self {
         let share_bytes = means.share_bytes / 8 / means.pool.current_num_threads() as u64;
-        let extent = Curve::new(tape.bounds).extent;
+        let extent = Curve::new(bounds).extent;
         let sight = Sight::new(Walker::new(tree, share_bytes), extent);
-        Self { triangles: &tape.triangles, sight, room: Vec::new() }
+        Self { triangles: &tree.triangles, sight, room: Vec::new() }
     }
 
     fn is_hidden(&mut self, extent: Extent) -> Result<bool, StoreError> {

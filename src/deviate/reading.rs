@@ -1,12 +1,14 @@
-//! Reads a surface: its triangles with finite corners, in file order, and its size.
+//! Reads a surface: its triangles with finite corners, in file order, its size, and which of its
+//! triangles lie beside those before them.
 //!
-//! Memory:     an eighth of the share.
+//! Memory:     three sixteenths of the share.
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
+use crate::deviate::runs::{Run, Runs};
 use crate::deviate::{DeviateError, Means};
-use crate::geom::mix;
+use crate::geom::mix_words;
 use crate::mesh::{MeshSource, TriangleBatch};
 use crate::store::{Sequence, StoreError};
 
@@ -31,6 +33,12 @@ impl Triangle {
         [DVec3::from_array(a), DVec3::from_array(b), DVec3::from_array(c)]
     }
 
+    /// Its area.
+    #[inline]
+    pub(crate) fn area(&self) -> f64 {
+        self.normal().length() / 2.0
+    }
+
     /// Its normal, twice as long as its area is large.
     #[inline]
     pub(crate) fn normal(&self) -> DVec3 {
@@ -40,13 +48,16 @@ impl Triangle {
 }
 
 /// A hash of numbers, the same for both zeros.
-pub(crate) fn hash_of<'n>(numbers: impl IntoIterator<Item = &'n f64>) -> u64 {
-    numbers.into_iter().fold(0, |bits, x| mix(bits ^ (x + 0.0).to_bits()))
+#[inline]
+pub(crate) fn hash_of(numbers: &[f64]) -> u64 {
+    mix_words(numbers.iter().map(|x| (x + 0.0).to_bits()))
 }
 
 /// A surface that was read.
 pub(crate) struct Tape {
     pub(crate) triangles: Sequence<Triangle>,
+    /// All triangles again, in runs of neighbours.
+    pub(crate) runs: Sequence<Run>,
     /// Lowest and highest corner.
     pub(crate) bounds: [[f64; 3]; 2],
     pub(crate) area: f64,
@@ -61,24 +72,64 @@ impl Tape {
     }
 }
 
-/// Reads `source` to its end.
-pub(crate) fn read<S: MeshSource + ?Sized>(
-    source: &mut S,
-    means: &Means<'_>,
-) -> Result<Tape, DeviateError<S::Error>> {
-    read_with(source, means, |_, _| Ok(()))
+/// A tape while triangles come.
+pub(crate) struct TapeWriter {
+    triangles: Sequence<Triangle>,
+    runs: Runs,
+    low: DVec3,
+    high: DVec3,
+    area: f64,
 }
 
-/// The same; `note` hears of each triangle with the number of its part.
-pub(crate) fn read_with<S: MeshSource + ?Sized>(
+impl TapeWriter {
+    /// No triangles yet.
+    pub(crate) fn new(means: &Means<'_>) -> Self {
+        Self {
+            triangles: Sequence::new(means.scratch, means.share_bytes / 8),
+            runs: Runs::new(means),
+            low: DVec3::INFINITY,
+            high: DVec3::NEG_INFINITY,
+            area: 0.0,
+        }
+    }
+
+    /// Takes in a triangle with finite corners, and tells how it stands on the tape.
+    pub(crate) fn push(
+        &mut self,
+        corners: &[[f64; 3]; 3],
+        is_pane: bool,
+    ) -> Result<Triangle, StoreError> {
+        let number = self.triangles.len() as u32;
+        let triangle = Triangle { corners: *corners, number, is_pane: u32::from(is_pane) };
+        let [a, b, c] = triangle.points();
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        (self.low, self.high) = (self.low.min(low), self.high.max(high));
+        let area = triangle.area();
+        self.area += area;
+        self.runs.add(&triangle, [low, high], area)?;
+        self.triangles.push(triangle)?;
+        Ok(triangle)
+    }
+
+    /// All that came.
+    pub(crate) fn finish(self) -> Result<Tape, StoreError> {
+        Ok(Tape {
+            triangles: self.triangles,
+            runs: self.runs.finish()?,
+            bounds: [self.low.into(), self.high.into()],
+            area: self.area,
+        })
+    }
+}
+
+/// Reads `source` to its end; `note` hears of each triangle with the number of its part.
+pub(crate) fn read<S: MeshSource + ?Sized>(
     source: &mut S,
     means: &Means<'_>,
     mut note: impl FnMut(u32, &Triangle) -> Result<(), StoreError>,
 ) -> Result<Tape, DeviateError<S::Error>> {
     let failed = |source| DeviateError::Source { source };
-    let mut triangles = Sequence::new(means.scratch, means.share_bytes / 8);
-    let mut bounds = [[f64::INFINITY; 3], [f64::NEG_INFINITY; 3]];
-    let mut area = 0.0;
+    let mut tape = TapeWriter::new(means);
     let mut batch = TriangleBatch::default();
     // The material that was asked for last, and whether light passes it.
     let mut last = None;
@@ -94,17 +145,9 @@ pub(crate) fn read_with<S: MeshSource + ?Sized>(
                 _ => source.material(material).map_err(failed)?.transparent,
             };
             last = Some((material, is_pane));
-            for (corner, axis) in corners.iter().flat_map(|c| (0..3).map(move |axis| (c, axis))) {
-                bounds[0][axis] = bounds[0][axis].min(corner[axis]);
-                bounds[1][axis] = bounds[1][axis].max(corner[axis]);
-            }
-            let number = triangles.len() as u32;
-            let triangle = Triangle { corners: *corners, number, is_pane: u32::from(is_pane) };
-            area += triangle.normal().length() / 2.0;
-            note(part, &triangle)?;
-            triangles.push(triangle)?;
+            note(part, &tape.push(corners, is_pane)?)?;
         }
         means.monitor.advance(batch.len() as u64);
     }
-    Ok(Tape { triangles, bounds, area })
+    Ok(tape.finish()?)
 }

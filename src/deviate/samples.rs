@@ -1,16 +1,20 @@
 //! Samples of a surface: points spread evenly over its area, and corners of its triangles.
 //!
-//! Invariant:  depends on the triangles and their order alone. A triangle has the share of the
-//!             samples that it has of the area, but for rounding; where they lie in it follows from
-//!             its number.
+//! Invariant:  depends on the triangles and their order alone. A run of triangles has the share of the
+//!             samples that it has of the area, but for rounding, and so have its triangles of these;
+//!             where they lie in one follows from its number.
 //! Memory:     two sixteenths of the share.
 //! Source:     Turk 1990, Generating random points in triangles.
+
+use std::ops::Range;
 
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::Means;
+use crate::deviate::pages::Pages;
 use crate::deviate::reading::{BLOCK, Tape, Triangle, hash_of};
+use crate::deviate::runs::Run;
 use crate::deviate::tree::Curve;
 use crate::geom::mix;
 use crate::store::{Record, Sequence, Sorter, StoreError};
@@ -65,7 +69,7 @@ impl Spread {
     }
 
     /// How many a thing of this size gets, and the numbers passed before it.
-    pub(crate) fn take(&mut self, size: f64) -> std::ops::Range<u64> {
+    pub(crate) fn take(&mut self, size: f64) -> Range<u64> {
         let before = self.sum as u64;
         self.sum += size * self.per_size;
         before..self.sum as u64
@@ -78,53 +82,91 @@ pub(crate) fn take_samples(
     count: u64,
     means: &Means<'_>,
 ) -> Result<Sequence<Sample>, StoreError> {
-    let curve = Curve::new(tape.bounds);
-    let stride = (3 * tape.triangles.len()).div_ceil(count.max(1));
+    let mut taker = Taker {
+        curve: Curve::new(tape.bounds),
+        stride: (3 * tape.triangles.len()).div_ceil(count.max(1)),
+        sorter: Sorter::new(means.scratch, means.share_bytes / 16),
+    };
     let mut spread = Spread::new(count, tape.area);
-    let mut sorter = Sorter::new(means.scratch, means.share_bytes / 16);
-    tape.triangles.each_block(BLOCK, |block| {
+    let mut triangles = Pages::new(&tape.triangles, 0);
+    tape.runs.each_block(BLOCK, |block| {
         means.stop_if_asked()?;
-        for triangle in block {
-            let normal = triangle.normal();
-            let numbers = spread.take(normal.length() / 2.0);
-            let normal = normal.normalize_or_zero();
-            for (at, number) in (0..).zip(numbers) {
-                let point = point_within(triangle, at);
-                sorter.push(sample(&curve, (point, normal, DVec3::ZERO), number, 0))?;
+        for Run { node, area, .. } in block {
+            let numbers = spread.take(*area);
+            let first = u64::from(node.first);
+            let is_asked = first.next_multiple_of(taker.stride) < first + u64::from(node.count);
+            // Most runs are not even read.
+            if is_asked || !numbers.is_empty() {
+                taker.take(triangles.group(node.first, node.count)?, *area, numbers)?;
             }
-            if u64::from(triangle.number).is_multiple_of(stride) {
+        }
+        Ok(())
+    })?;
+    each_place_once(taker.sorter, means)
+}
+
+/// Takes samples of one run after another.
+struct Taker {
+    curve: Curve,
+    /// Of so many triangles one has its corners measured.
+    stride: u64,
+    sorter: Sorter<Sample>,
+}
+
+impl Taker {
+    /// Samples with these numbers, spread over triangles that have an area together.
+    fn take(
+        &mut self,
+        triangles: &[Triangle],
+        area: f64,
+        numbers: Range<u64>,
+    ) -> Result<(), StoreError> {
+        let mut spread = Spread::new(numbers.end - numbers.start, area);
+        let (mut from, mut left) = (numbers.start, triangles.len());
+        for triangle in triangles {
+            let normal = triangle.normal();
+            let upto = numbers.start + spread.take(normal.length() / 2.0).end;
+            left -= 1;
+            // Rounding must not lose the last one.
+            let upto = if left == 0 { numbers.end } else { upto.min(numbers.end) };
+            let normal = normal.normalize_or_zero();
+            for (at, number) in (0..).zip(from..upto) {
+                let point = point_within(triangle, at);
+                self.push((point, normal, DVec3::ZERO), number, 0)?;
+            }
+            from = upto;
+            if u64::from(triangle.number).is_multiple_of(self.stride) {
                 let [a, b, c] = triangle.points();
                 let middle = (a + b + c) / 3.0;
                 for (at, corner) in (0..).zip([a, b, c]) {
                     let inward = (middle - corner).normalize_or_zero();
                     let number = u64::from(triangle.number) * 3 + at;
-                    sorter.push(sample(&curve, (corner, normal, inward), number, 1))?;
+                    self.push((corner, normal, inward), number, 1)?;
                 }
             }
         }
         Ok(())
-    })?;
-    each_place_once(sorter, means)
-}
+    }
 
-fn sample(
-    curve: &Curve,
-    (point, normal, inward): (DVec3, DVec3, DVec3),
-    number: u64,
-    corner: u64,
-) -> Sample {
-    let place = match corner {
-        1 => hash_of(&point.to_array()),
-        _ => 0,
-    };
-    Sample {
-        key: curve.key(point),
-        place,
-        number,
-        point: point.into(),
-        normal: normal.into(),
-        inward: inward.into(),
-        corner,
+    fn push(
+        &mut self,
+        (point, normal, inward): (DVec3, DVec3, DVec3),
+        number: u64,
+        corner: u64,
+    ) -> Result<(), StoreError> {
+        let place = match corner {
+            1 => hash_of(&point.to_array()),
+            _ => 0,
+        };
+        self.sorter.push(Sample {
+            key: self.curve.key(point),
+            place,
+            number,
+            point: point.into(),
+            normal: normal.into(),
+            inward: inward.into(),
+            corner,
+        })
     }
 }
 

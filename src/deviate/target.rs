@@ -9,7 +9,6 @@ use glam::DVec3;
 
 use crate::deviate::nearest::{Near, Walker};
 use crate::deviate::reading::read;
-use crate::deviate::surface::tree_of;
 use crate::deviate::tree::Tree;
 use crate::deviate::{DeviateError, Means};
 use crate::mesh::{LengthUnit, MeshSource};
@@ -29,24 +28,22 @@ pub struct Target {
 
 impl Target {
     /// Reads `source` to its end; `None` if it has no area, or is so large that squares of its
-    /// lengths are no numbers. Triangles with infinite corners are left out. `is_coherent` tells that
-    /// triangles lie near those before and after them in the file: then they are not sorted.
+    /// lengths are no numbers. Triangles with infinite corners are left out.
     ///
     /// # Errors
     /// [`DeviateError`]: the source fails, the scratch disk fails, or the caller cancels.
     pub fn read<S: MeshSource + ?Sized>(
         source: &mut S,
-        is_coherent: bool,
         means: &Means<'_>,
     ) -> Result<Option<Self>, DeviateError<S::Error>> {
-        let tape = read(source, means)?;
+        let tape = read(source, means, |_, _| Ok(()))?;
         if !tape.is_measurable() {
             return Ok(None);
         }
         let [low, high] = tape.bounds.map(DVec3::from);
         let (diagonal, unit) = (low.distance(high), source.unit());
         let reach = low.abs().max(high.abs()).max_element();
-        Ok(Some(Self { tree: tree_of(tape, is_coherent, means)?, diagonal, reach, unit }))
+        Ok(Some(Self { tree: Tree::around(tape, means)?, diagonal, reach, unit }))
     }
 
     /// Diagonal of its box, model units.

@@ -24,7 +24,6 @@ struct Workshop {
     scratch: Scratch,
     pool: ThreadPool,
     share_bytes: u64,
-    is_coherent: bool,
 }
 
 impl Workshop {
@@ -32,7 +31,7 @@ impl Workshop {
         let folder = tempfile::tempdir().expect("a temporary folder");
         let scratch = Scratch::new(folder.path());
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool");
-        Self { _folder: folder, scratch, pool, share_bytes, is_coherent: false }
+        Self { _folder: folder, scratch, pool, share_bytes }
     }
 
     fn means(&self) -> Means<'_> {
@@ -42,7 +41,7 @@ impl Workshop {
 
     fn read(&self, triangles: &[Corners], samples: u64) -> Surface {
         let mut source = ListedTriangles::without_indices(triangles.to_vec());
-        let options = SurfaceOptions { samples, creases: true, is_coherent: self.is_coherent };
+        let options = SurfaceOptions { samples, creases: true };
         let surface = Surface::read(&mut source, &options, &self.means());
         surface.expect("the scratch disk works").expect("it has an area")
     }
@@ -123,15 +122,15 @@ fn distances_are_those_of_brute_force_whatever_the_share_and_the_threads() {
             let again = Workshop::new(threads, share_bytes).compare(&one, &other, &options);
             assert_eq!(again, found, "{threads} threads, {share_bytes} bytes");
         }
-        let unsorted = Workshop { is_coherent: true, ..Workshop::new(2, SMALL) };
-        assert_eq!(unsorted.compare(&one, &other, &options), found);
     }
 }
 
 #[test]
 fn points_are_measured_as_by_brute_force_whatever_the_share_and_the_threads() {
     let mut random = Random::new(7);
-    let triangles = soup(&mut random, 700);
+    // Some lie anywhere, some beside those before them.
+    let mut triangles = soup(&mut random, 500);
+    triangles.extend(torus(0.4, 0.1, 24, 8));
     let points: Vec<[f64; 3]> =
         (0..3000).map(|_| random.point().map(|part| 2.0 * part - 0.5)).collect();
     let expected = points.iter().map(|point| {
@@ -144,14 +143,12 @@ fn points_are_measured_as_by_brute_force_whatever_the_share_and_the_threads() {
     });
     let expected: Vec<f64> = expected.collect();
     for (threads, share_bytes) in [(1, LARGE), (1, SMALL), (4, SMALL)] {
-        for is_coherent in [false, true] {
-            let workshop = Workshop::new(threads, share_bytes);
-            let mut source = ListedTriangles::without_indices(triangles.clone());
-            let target = Target::read(&mut source, is_coherent, &workshop.means());
-            let target = target.expect("the scratch disk works").expect("it has an area");
-            let found = target.distances(&points, &workshop.means());
-            assert!(found.expect("the scratch disk works") == expected);
-        }
+        let workshop = Workshop::new(threads, share_bytes);
+        let mut source = ListedTriangles::without_indices(triangles.clone());
+        let target = Target::read(&mut source, &workshop.means());
+        let target = target.expect("the scratch disk works").expect("it has an area");
+        let found = target.distances(&points, &workshop.means());
+        assert!(found.expect("the scratch disk works") == expected);
     }
 }
 
@@ -239,7 +236,7 @@ fn surfaces_without_an_area_or_without_squares_are_not_measured() {
         vec![[[f64::NAN; 3]; 3]],
     ] {
         let mut source = ListedTriangles::without_indices(triangles);
-        let options = SurfaceOptions { samples: 100, creases: true, is_coherent: false };
+        let options = SurfaceOptions { samples: 100, creases: true };
         let surface = Surface::read(&mut source, &options, &workshop.means());
         assert!(surface.expect("the scratch disk works").is_none());
     }

@@ -11,6 +11,16 @@ pub const fn mix(bits: u64) -> u64 {
     bits ^ bits >> 31
 }
 
+/// Mixes several words into one, by folded multiplication (Wang Yi, wyhash).
+#[must_use]
+#[inline]
+pub fn mix_words(words: impl IntoIterator<Item = u64>) -> u64 {
+    words.into_iter().fold(0x2d35_8dcc_aa6c_78a5, |mixed, word| {
+        let product = u128::from(mixed ^ word) * 0x9e37_79b9_7f4a_7c15_u128;
+        (product as u64 ^ (product >> 64) as u64).rotate_left(29) ^ word
+    })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

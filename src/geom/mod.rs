@@ -19,4 +19,4 @@ pub use clearance::are_within;
 pub use closest::closest_on_triangle;
 pub use ear_clipping::EarClipper;
 pub use halving::{ball_around, halve, longest_edge, rejoin};
-pub use mix::mix;
+pub use mix::{mix, mix_words};

@@ -28,6 +28,7 @@ pub struct AreaHistogram {
     bounds: SnapBox,
     centre: [f64; 3],
     longest: f64,
+    slices_per_unit: f64,
     slices: [Vec<f64>; 3],
     area: f64,
     signed_volume: f64,
@@ -39,7 +40,8 @@ impl AreaHistogram {
         let centre = std::array::from_fn(|a| bounds.lo[a] * 0.5 + bounds.hi[a] * 0.5);
         let slices = std::array::from_fn(|_| vec![0.0; SLICES]);
         let longest = bounds.longest();
-        Self { bounds, centre, longest, slices, area: 0.0, signed_volume: 0.0 }
+        let slices_per_unit = SLICES as f64 / longest;
+        Self { bounds, centre, longest, slices_per_unit, slices, area: 0.0, signed_volume: 0.0 }
     }
 
     /// Adds a triangle.
@@ -55,14 +57,18 @@ impl AreaHistogram {
         self.signed_volume += p.dot(q.cross(r)) / 6.0;
         if self.longest > 0.0 && self.longest.is_finite() {
             for axis in 0..3 {
+                let to_lo = self.centre[axis] - self.bounds.lo[axis];
                 let slice = |coordinate: f64| {
-                    let from_lo = coordinate + (self.centre[axis] - self.bounds.lo[axis]);
-                    ((from_lo / self.longest * SLICES as f64) as usize).min(SLICES - 1)
+                    (((coordinate + to_lo) * self.slices_per_unit) as usize).min(SLICES - 1)
                 };
                 let first = slice(p[axis].min(q[axis]).min(r[axis]));
                 let last = slice(p[axis].max(q[axis]).max(r[axis]));
-                let each = area / (last - first + 1) as f64;
-                self.slices[axis][first..=last].iter_mut().for_each(|slice| *slice += each);
+                if first == last {
+                    self.slices[axis][first] += area;
+                } else {
+                    let each = area / (last - first + 1) as f64;
+                    self.slices[axis][first..=last].iter_mut().for_each(|slice| *slice += each);
+                }
             }
         }
     }

@@ -9,7 +9,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::ingest::packed::{Given, given_corners, mix};
+use crate::ingest::packed::{Given, given, mix};
 use crate::octree::points::{is_degenerate, snapped};
 use crate::octree::{Domain, SoupTriangle};
 
@@ -18,11 +18,25 @@ const SLOTS: usize = 2048;
 
 #[derive(Clone, Copy, Default)]
 struct Slot {
+    /// Of the corners, whatever their order.
+    hash: u64,
     corners: [Given; 3],
     /// How often it was let through.
     passed: u8,
     /// A third, fifth, ... copy: it goes with the next one, or is let through in the end.
     waiting: Option<SoupTriangle>,
+}
+
+impl Slot {
+    /// Whether these are its corners, in whatever order.
+    fn holds(&self, hash: u64, corners: [Given; 3]) -> bool {
+        self.hash == hash && sorted(self.corners) == sorted(corners)
+    }
+}
+
+fn sorted(mut corners: [Given; 3]) -> [Given; 3] {
+    corners.sort_unstable();
+    corners
 }
 
 /// Triangles that are in no bin: copies of others, which cancel in pairs.
@@ -50,11 +64,12 @@ impl<'d> CrowdFilter<'d> {
     pub(crate) fn thin_out(&mut self, triangles: &mut Vec<SoupTriangle>) {
         let mut overdue = Vec::new();
         triangles.retain(|triangle| {
-            let corners = given_corners(&triangle.corners);
-            let slot = &mut self.slots[mix(corners.as_flattened()) as usize % SLOTS];
-            if slot.passed == 0 || slot.corners != corners {
+            let corners = triangle.corners.map(given);
+            let hash = corners.iter().fold(0_u64, |sum, corner| sum.wrapping_add(mix(corner)));
+            let slot = &mut self.slots[hash as usize % SLOTS];
+            if slot.passed == 0 || !slot.holds(hash, corners) {
                 overdue.extend(slot.waiting);
-                *slot = Slot { corners, passed: 1, waiting: None };
+                *slot = Slot { hash, corners, passed: 1, waiting: None };
                 return true;
             }
             if slot.passed == 1 {

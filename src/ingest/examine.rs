@@ -10,11 +10,13 @@ use crate::ingest::duplicates::SettleStats;
 use crate::ingest::edges::judge_edges;
 use crate::ingest::facts::{Copied, DIFFERS, Fact};
 use crate::ingest::packed::{
-    EdgeUse, KeySet, Member, NO_GROUP, NO_WIDTH, Triple, given_edge, given_triangle, pack_corners,
-    turn_of,
+    EdgeUse, KeySet, Member, NO_GROUP, NO_WIDTH, Triple, given_edge, given_triangle, mix,
+    pack_corners, turn_of,
 };
-use crate::octree::points::{is_degenerate, length_of, owner, pack_ends, snapped, unpack_ends};
-use crate::octree::{BinEntry, Domain, SoupTriangle};
+use crate::octree::points::{
+    Point, is_degenerate, length_of, owner, pack_ends, snapped, unpack_ends,
+};
+use crate::octree::{BinEntry, BrickKey, Domain, SoupTriangle};
 use crate::store::{Outbox, Scratch, Sorter, StoreError};
 
 /// Where a worker puts what it finds, and what it may use.
@@ -26,6 +28,49 @@ pub(crate) struct Examiner<'e> {
     pub(crate) share_bytes: u64,
     pub(crate) copies: Outbox<'e, Copied>,
     pub(crate) facts: Outbox<'e, Fact>,
+}
+
+/// The lattice points that a brick owns.
+struct Owned {
+    low: Point,
+    side: u32,
+}
+
+impl Owned {
+    fn new(domain: &Domain, brick: u64) -> Self {
+        let side = domain.brick_units() as u32;
+        Self { low: BrickKey(brick).position().map(|c| c * side), side }
+    }
+
+    #[inline]
+    fn holds(&self, point: Point) -> bool {
+        // What lies below wraps around.
+        (0..3).all(|a| point[a].wrapping_sub(self.low[a]) < self.side)
+    }
+}
+
+/// The edges of a triangle with ascending corners that have a length, their lower ends first.
+#[inline]
+fn edges_of([p, q, r]: [Point; 3]) -> impl Iterator<Item = [Point; 2]> {
+    [[p, q], [q, r], [p, r]].into_iter().filter(|[lower, upper]| lower != upper)
+}
+
+/// Tells whether any of the edges that were added came an odd number of times: those that came twice
+/// cancel out in the sums of their hashes, of which there are two, so that nothing else does.
+#[derive(Default)]
+struct Parity([u64; 2]);
+
+impl Parity {
+    #[inline]
+    fn add(&mut self, ends: [Point; 2]) {
+        let [high, middle, low] = pack_ends(ends);
+        self.0[0] ^= mix(&[high, middle, low]);
+        self.0[1] ^= mix(&[low, high, middle]);
+    }
+
+    fn has_odd(&self) -> bool {
+        self.0 != [0; 2]
+    }
 }
 
 /// Bins of at most this many triangles are examined by hashing, larger ones by sorting.
@@ -47,32 +92,50 @@ impl Examiner<'_> {
         self.domain.cell_size() / f64::from(self.domain.cell_units)
     }
 
-    /// The counts of a bin without copies; `None` when there are copies. Edges are put in and
-    /// taken out again: what stays is odd.
+    /// The counts of a bin without copies; `None` when there may be copies.
     fn examine_small(&self, entry: BinEntry) -> Result<Option<SettleStats>, StoreError> {
-        let domain = self.domain;
+        let owned = Owned::new(self.domain, entry.brick);
         let mut stats = SettleStats::default();
-        let mut triples =
-            KeySet::with_capacity_and_hasher(entry.count as usize, Default::default());
+        let mut seen = KeySet::with_capacity_and_hasher(entry.count as usize, Default::default());
+        let mut parity = Parity::default();
+        let mut reader = self.bins.triangles.reader(entry.first, entry.count);
+        while let Some(block) = reader.next_block()? {
+            for triangle in block {
+                let mut corners = snapped(self.domain, triangle);
+                corners.sort_unstable();
+                if owned.holds(corners[0]) && is_degenerate(corners) {
+                    stats.degenerate_triangles += 1;
+                }
+                if !seen.insert(mix(&pack_corners(corners))) {
+                    return Ok(None);
+                }
+                edges_of(corners).filter(|ends| owned.holds(ends[0])).for_each(|e| parity.add(e));
+            }
+        }
+        if parity.has_odd() {
+            self.find_rims(entry, &owned, &mut stats)?;
+        }
+        Ok(Some(stats))
+    }
+
+    /// Counts the open edges of a bin without copies. Edges are put in and taken out again: what stays
+    /// is odd.
+    fn find_rims(
+        &self,
+        entry: BinEntry,
+        owned: &Owned,
+        stats: &mut SettleStats,
+    ) -> Result<(), StoreError> {
         let mut odd: KeySet<[u64; 3]> = KeySet::default();
         let mut reader = self.bins.triangles.reader(entry.first, entry.count);
         while let Some(block) = reader.next_block()? {
             for triangle in block {
-                let mut corners = snapped(domain, triangle);
+                let mut corners = snapped(self.domain, triangle);
                 corners.sort_unstable();
-                let [p, q, r] = corners;
-                if owner(domain, p) == entry.brick && is_degenerate(corners) {
-                    stats.degenerate_triangles += 1;
-                }
-                if !triples.insert(pack_corners(corners)) {
-                    return Ok(None);
-                }
-                for ends in [[p, q], [q, r], [p, r]] {
-                    if ends[0] != ends[1] && owner(domain, ends[0]) == entry.brick {
-                        let key = pack_ends(ends);
-                        if !odd.remove(&key) {
-                            odd.insert(key);
-                        }
+                for ends in edges_of(corners).filter(|ends| owned.holds(ends[0])) {
+                    let key = pack_ends(ends);
+                    if !odd.remove(&key) {
+                        odd.insert(key);
                     }
                 }
             }
@@ -80,7 +143,7 @@ impl Examiner<'_> {
         let mut odd: Vec<[u64; 3]> = odd.into_iter().collect();
         odd.sort_unstable();
         odd.iter().for_each(|&ends| stats.add_rim(length_of(unpack_ends(ends), self.unit())));
-        Ok(Some(stats))
+        Ok(())
     }
 
     /// Examines a bin of any size, or one with copies.

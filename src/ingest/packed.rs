@@ -7,6 +7,7 @@ use std::hash::{BuildHasherDefault, Hasher};
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
+use crate::geom::mix_words;
 use crate::octree::points::{Point, pack_point};
 use crate::store::Record;
 
@@ -103,12 +104,10 @@ pub(crate) fn given_edge(a: [f64; 3], b: [f64; 3]) -> u64 {
     mix([a.min(b), a.max(b)].as_flattened())
 }
 
-/// Mixes words by folded multiplication.
+/// Mixes words.
+#[inline]
 pub(crate) fn mix(words: &[u64]) -> u64 {
-    words.iter().fold(0x2D35_8DCC_AA6C_78A5, |mixed, word| {
-        let product = u128::from(mixed ^ word) * 0x9E37_79B9_7F4A_7C15_u128;
-        (product as u64 ^ (product >> 64) as u64).rotate_left(29) ^ word
-    })
+    mix_words(words.iter().copied())
 }
 
 /// Three corners of 84 bits, one bit short of four words: comparing words is comparing corners.

@@ -65,12 +65,10 @@ impl Run<'_> {
     ) -> Result<Option<Deviation>, RepairError> {
         let Resources { scratch, pool, monitor, .. } = *resources;
         let means = Means { scratch, pool, share_bytes: resources.share_bytes / 4 * 3, monitor };
-        // Contouring writes neighbours after each other, and models list them so as a rule.
-        let asked = SurfaceOptions { samples: SAMPLES, creases: true, is_coherent: true };
+        let asked = SurfaceOptions { samples: SAMPLES, creases: true };
         let soup = Spool::open(scratch, soup)?;
         let mut soup = SoupSource::new(&soup);
-        let before =
-            Surface::read(&mut soup, &SurfaceOptions { is_coherent: false, ..asked }, &means);
+        let before = Surface::read(&mut soup, &asked, &means);
         let before = before.map_err(|error| match error {
             DeviateError::Source { source } | DeviateError::Store(source) => source,
         })?;

@@ -197,7 +197,7 @@ impl Verifying<'_> {
         self.monitor.begin(Stage::Deviate, 0);
         let mut source = self.open(path).map_err(RepairError::Input)?;
         let samples = self.settings.samples;
-        let options = SurfaceOptions { samples, creases: true, is_coherent: false };
+        let options = SurfaceOptions { samples, creases: true };
         let surface = Surface::read(&mut *source, &options, &self.means());
         let surface = surface.map_err(|error| match error {
             DeviateError::Source { source } => RepairError::Input(source),

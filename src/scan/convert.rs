@@ -27,6 +27,17 @@ pub struct Converter {
 struct Snapped {
     corners: [[i64; 3]; 3],
     normal: [i64; 3],
+    /// What it covers along each axis.
+    extents: [Extent; 3],
+}
+
+/// What a triangle covers of a brick along an axis.
+#[derive(Clone, Copy)]
+struct Extent {
+    /// Whether it comes to the brick at all.
+    is_there: bool,
+    /// First and last of the lines across the axis that may pierce it; none if they do not ascend.
+    lines: [i64; 2],
 }
 
 impl Converter {
@@ -52,7 +63,8 @@ impl Converter {
             let (u, v) = ((a + 1) % 3, (a + 2) % 3);
             e[u] * f[v] - e[v] * f[u]
         });
-        let snapped = Snapped { corners, normal };
+        let extents = std::array::from_fn(|axis| self.extent(corners.map(|c: [i64; 3]| c[axis])));
+        let snapped = Snapped { corners, normal, extents };
         let mut plane = None;
         for axis in 0..3 {
             if normal[axis] != 0 {
@@ -93,9 +105,9 @@ impl Converter {
         visit: &mut impl FnMut([usize; 2], usize),
     ) {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        let Some((first_u, last_u)) = self.columns(triangle, u) else { return };
-        let Some((first_v, last_v)) = self.columns(triangle, v) else { return };
-        if self.columns_along(triangle, axis) {
+        let [first_u, last_u] = triangle.extents[u].lines;
+        let [first_v, last_v] = triangle.extents[v].lines;
+        if first_u > last_u || first_v > last_v || !triangle.extents[axis].is_there {
             return;
         }
         let sides = Sides::new(triangle, axis);
@@ -114,22 +126,17 @@ impl Converter {
     }
 
     /// The lines of the brick with lo <= line < hi of the triangle: the grid sits at +e.
-    fn columns(&self, triangle: &Snapped, axis: usize) -> Option<(i64, i64)> {
-        let [p, q, r] = triangle.corners.map(|c| c[axis]);
+    fn extent(&self, [p, q, r]: [i64; 3]) -> Extent {
         let (lo, hi) = (p.min(q).min(r), p.max(q).max(r));
-        let end = (LINES as i64 - 1) * self.cell;
+        let last_line = LINES as i64 - 1;
+        let end = last_line * self.cell;
         if hi <= 0 || lo > end {
-            return None;
+            return Extent { is_there: hi >= 0 && lo <= end, lines: [1, 0] };
         }
-        let first = if lo <= 0 { 0 } else { (lo - 1) / self.cell + 1 };
-        let last = ((hi - 1) / self.cell).min(LINES as i64 - 1);
-        (first <= last).then_some((first, last))
-    }
-
-    /// Whether the triangle misses the brick along `axis`.
-    fn columns_along(&self, triangle: &Snapped, axis: usize) -> bool {
-        let [p, q, r] = triangle.corners.map(|c| c[axis]);
-        p.max(q).max(r) < 0 || p.min(q).min(r) > SIDE as i64 * self.cell
+        // Both are above zero and within the lattice, which has fewer units a side than a u32.
+        let lines_below = |x: i64| i64::from((x - 1) as u32 / self.cell as u32);
+        let first = if lo <= 0 { 0 } else { lines_below(lo) + 1 };
+        Extent { is_there: true, lines: [first, lines_below(hi).min(last_line)] }
     }
 
     /// The edge on which the line at (line_u, line_v) pierces the triangle's plane.

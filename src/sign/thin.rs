@@ -23,6 +23,8 @@ const PARALLEL: f64 = 0.8;
 
 /// Corners of the largest speck.
 const SPECK_CORNERS: u32 = 8;
+/// Edges that leave a speck, at most.
+const SPECK_EDGES: usize = 6 * SPECK_CORNERS as usize;
 
 /// Finds the lost hits of all bricks.
 ///
@@ -51,6 +53,9 @@ pub fn find_lost(
             if known.iter().all(|region| region & OUTSIDE == 0) {
                 return Ok(Vec::new());
             }
+            if is_parted_in_two(hits, &item, &known)? {
+                return Ok(Vec::new());
+            }
             let Some(view) = loaded.load(hits, &item)? else { return Ok(Vec::new()) };
             let regions = find_regions(&loaded.barrier);
             // A wall that is left as specks is lost as well.
@@ -64,6 +69,22 @@ pub fn find_lost(
         |found: Vec<LostHits>| Ok::<(), SignError>(lost.extend(&found)?),
     )?;
     Ok(lost)
+}
+
+/// Whether a brick is surely one inside and one outside, with every hit between them: then nothing is lost,
+/// and no speck is that large. Most bricks are.
+fn is_parted_in_two(hits: &BrickFile, item: &LoadItem, known: &[u8]) -> Result<bool, SignError> {
+    let outsides = known.iter().filter(|region| **region & OUTSIDE != 0).count();
+    let Some(number) = item.hits.filter(|_| item.flips.is_empty()) else { return Ok(false) };
+    if (known.len(), outsides) != (2, 1) {
+        return Ok(false);
+    }
+    let view = hits.view(number)?;
+    let edges = &decode_hits(&view)?.edges;
+    // No face is odd where nothing was patched. If all classes are odd as well, parity changes where an
+    // edge is hit and nowhere else, so that the ends of such an edge lie in both regions.
+    let is_odd = |bits: u32| HitEdge { bits, signed_sum: 0 }.class() & 1 == 1;
+    Ok(edges.len() > SPECK_EDGES && edges.iter().all(|edge| is_odd(edge.bits.to_native())))
 }
 
 /// Which regions are specks: of few corners, all within the brick, with nothing inside beside them.

@@ -1,8 +1,11 @@
-//! The hash by which a file of ours is known again: half of blake3.
+//! The hashes by which files of ours are known again: half of blake3 for what stands for a whole file,
+//! XXH3 for its parts, which are many, and are guarded against accidents only.
 
 use std::fs::File;
 use std::io::{ErrorKind, Read};
 use std::path::Path;
+
+use twox_hash::XxHash3_128;
 
 use crate::store::StoreError;
 
@@ -11,12 +14,17 @@ const BLOCK_BYTES: usize = 128 << 10;
 /// Size of a digest in bytes.
 pub const DIGEST_BYTES: usize = 16;
 
-/// The first half of a blake3 hash.
+/// The first half of a blake3 hash; of a part of a file its XXH3.
 pub type Digest = [u8; DIGEST_BYTES];
 
 /// The digest of `bytes`.
 pub(crate) fn digest(bytes: &[u8]) -> Digest {
     first_half(&blake3::hash(bytes))
+}
+
+/// The digest of a part of a file: its XXH3 of 128 bits, lowest byte first.
+pub(crate) fn part_digest(bytes: &[u8]) -> Digest {
+    XxHash3_128::oneshot(bytes).to_le_bytes()
 }
 
 /// The digest of many pieces, in order. It may be asked for at any time.

@@ -30,8 +30,8 @@ pub use brick::{Backing, BrickFile, BrickWriter, DirectoryEntry, View, directory
 pub use brick_pass::BrickPass;
 pub use checkpoint::{Checkpoints, FileState, NoCheckpoints, Progress};
 pub use dictionary::{Dictionary, MOST_NAMES};
-pub(crate) use digest::digest;
 pub use digest::{DIGEST_BYTES, Digest, Digester, digest_file};
+pub(crate) use digest::{digest, part_digest};
 pub use error::StoreError;
 pub use manifest::{Manifest, load_manifest, save_manifest};
 pub use outbox::Outbox;
@@ -48,4 +48,4 @@ pub use texts::{NumberedTexts, Texts, TextsWriter};
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.
-pub const FORMAT_VERSION: u32 = 8;
+pub const FORMAT_VERSION: u32 = 9;

@@ -28,6 +28,8 @@ pub trait Record: Pod + Send + Sync {
 const PAGE_BYTES: usize = 4096;
 /// Records of this size and more are sorted by their keys and moved once.
 const WIDE_BYTES: usize = 64;
+/// Largest read buffer of a run in a merge: more would only leave the cache.
+const MERGE_BYTES: usize = 256 << 10;
 /// Wide records are gathered into blocks of this size on their way to the disk.
 const GATHER_BYTES: usize = 64 << 10;
 
@@ -241,6 +243,9 @@ impl<R: Record> Sorted<R> {
 struct Merge<R: Record> {
     file: Arc<ScratchFile>,
     cursors: Vec<Cursor<R>>,
+    /// The run whose next record is the next of all.
+    current: Option<usize>,
+    /// The next keys of the other runs.
     heap: BinaryHeap<Reverse<(R::Key, usize)>>,
     block_records: usize,
 }
@@ -255,29 +260,34 @@ struct Cursor<R> {
 impl<R: Record> Merge<R> {
     fn new(runs: Runs, share_bytes: usize) -> Result<Self, StoreError> {
         let file = runs.file.expect("a merge has runs");
-        let block_records = (share_bytes / runs.extents.len() / size_of::<R>()).max(1);
+        let block_bytes = (share_bytes / runs.extents.len()).min(MERGE_BYTES);
+        let block_records = (block_bytes / size_of::<R>()).max(1);
         let cursors = runs
             .extents
             .iter()
             .map(|&(offset, left)| Cursor { offset, left, block: Vec::new(), at: 0 })
             .collect::<Vec<_>>();
         let heap = BinaryHeap::with_capacity(cursors.len());
-        let mut merge = Self { file, cursors, heap, block_records };
+        let mut merge = Self { file, cursors, current: None, heap, block_records };
         for run in 0..merge.cursors.len() {
-            merge.advance(run)?;
+            if let Some(key) = merge.head(run)? {
+                merge.heap.push(Reverse((key, run)));
+            }
         }
+        merge.current = merge.heap.pop().map(|Reverse((_, run))| run);
         Ok(merge)
     }
 
-    /// Puts the next record of `run` on the heap, reading its next block when needed.
-    fn advance(&mut self, run: usize) -> Result<(), StoreError> {
+    /// The key of the next record of `run`, whose next block is read when needed.
+    #[inline]
+    fn head(&mut self, run: usize) -> Result<Option<R::Key>, StoreError> {
         let cursor = &mut self.cursors[run];
         if cursor.at == cursor.block.len() {
             let count = (cursor.left).min(self.block_records as u64) as usize;
             if count == 0 {
                 cursor.block = Vec::new();
                 cursor.at = 0;
-                return Ok(());
+                return Ok(None);
             }
             cursor.block.resize(count, R::zeroed());
             let bytes: &mut [u8] = bytemuck::cast_slice_mut(&mut cursor.block);
@@ -286,17 +296,26 @@ impl<R: Record> Merge<R> {
             cursor.left -= count as u64;
             cursor.at = 0;
         }
-        let key = cursor.block[cursor.at].key();
-        self.heap.push(Reverse((key, run)));
-        Ok(())
+        Ok(Some(cursor.block[cursor.at].key()))
     }
 
     fn next(&mut self) -> Result<Option<R>, StoreError> {
-        let Some(Reverse((_, run))) = self.heap.pop() else { return Ok(None) };
+        let Some(run) = self.current else { return Ok(None) };
         let cursor = &mut self.cursors[run];
         let record = cursor.block[cursor.at];
         cursor.at += 1;
-        self.advance(run)?;
+        match self.head(run)? {
+            // What follows often comes from the same run: then the heap stays as it is.
+            Some(key) => {
+                if let Some(mut least) = self.heap.peek_mut()
+                    && least.0.0 < key
+                {
+                    self.current = Some(least.0.1);
+                    *least = Reverse((key, run));
+                }
+            }
+            None => self.current = self.heap.pop().map(|Reverse((_, run))| run),
+        }
         Ok(Some(record))
     }
 }

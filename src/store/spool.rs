@@ -12,11 +12,12 @@ use bytemuck::Pod;
 
 use crate::store::{
     DIGEST_BYTES, Digest, FORMAT_VERSION, FileState, Scratch, ScratchFile, StoreError, digest,
+    part_digest,
 };
 
 const MAGIC: [u8; 8] = *b"BRMDSPOL";
 const HEADER_BYTES: u64 = 64;
-const BLOCK_BYTES: usize = 128 << 10;
+const BLOCK_BYTES: usize = 64 << 10;
 
 /// Records that share a digest.
 const fn block_records<R>() -> usize {
@@ -72,7 +73,7 @@ impl<R: Pod> SpoolWriter<R> {
         }
         let first = self.len - self.block.len() as u64;
         let bytes: &[u8] = bytemuck::cast_slice(&self.block);
-        self.digests.push(digest(bytes));
+        self.digests.push(part_digest(bytes));
         self.file.write_at(bytes, offset_of::<R>(first))?;
         self.block.clear();
         Ok(())
@@ -222,7 +223,7 @@ impl<R: Pod> Spool<R> {
     }
 
     fn check(&self, block: u64, bytes: &[u8]) -> Result<(), StoreError> {
-        let (expected, found) = (self.digests[block as usize], digest(bytes));
+        let (expected, found) = (self.digests[block as usize], part_digest(bytes));
         if found != expected {
             let offset = offset_of::<R>(block * block_records::<R>() as u64);
             let expected = format!("a block with digest {expected:02x?}");

@@ -85,21 +85,7 @@ impl Workspace {
         brick: &mut CellBrick,
         stats: &mut ContourStats,
     ) -> Result<(), ContourError> {
-        let attempt = match around.flat_normal() {
-            Some(normal) => {
-                let normal = self.normals[normal as usize];
-                solve_flat(around.points(), normal, &self.qef).map(Attempt::Done)
-            }
-            None if self.is_smooth => {
-                let hits = around.hits(&self.normals);
-                solve_smooth(&hits[..around.count], &self.qef).map(Attempt::Done)
-            }
-            None => None,
-        };
-        let attempt = attempt.unwrap_or_else(|| {
-            let hits = around.hits(&self.normals);
-            begin(&hits[..around.count], &self.qef)
-        });
+        let attempt = self.attempt(around);
         if let Some(near) = self.near_feature(place, at, around)? {
             self.take_in(&near.planes, at, near.position);
             match near.face {
@@ -123,17 +109,47 @@ impl Workspace {
                 stats.clamped_vertices += u64::from(solution.clamped);
             }
             Attempt::Waiting(cell) => {
-                let waiting = &mut self.waiting;
-                waiting.cells[waiting.count] = cell;
-                waiting.places[waiting.count] = (at, brick.positions.len());
-                waiting.count += 1;
                 brick.positions.push([0; 3]);
-                if self.waiting.count == TOGETHER {
-                    self.place_waiting(brick, stats);
-                }
+                self.wait(cell, (at, brick.positions.len() - 1), brick, stats);
             }
         }
         Ok(())
+    }
+
+    /// The vertex of crossings without features around, by the shortest way that they allow.
+    pub(super) fn attempt(&self, around: &Around) -> Attempt {
+        let attempt = match around.flat_normal() {
+            Some(normal) => {
+                let normal = self.normals[normal as usize];
+                solve_flat(around.points(), normal, &self.qef).map(Attempt::Done)
+            }
+            None if self.is_smooth => {
+                let hits = around.hits(&self.normals);
+                solve_smooth(&hits[..around.count], &self.qef).map(Attempt::Done)
+            }
+            None => None,
+        };
+        attempt.unwrap_or_else(|| {
+            let hits = around.hits(&self.normals);
+            begin(&hits[..around.count], &self.qef)
+        })
+    }
+
+    /// Leaves a vertex of the brick to wait for others.
+    pub(super) fn wait(
+        &mut self,
+        cell: Waiting,
+        place: ([usize; 3], usize),
+        brick: &mut CellBrick,
+        stats: &mut ContourStats,
+    ) {
+        let waiting = &mut self.waiting;
+        waiting.cells[waiting.count] = cell;
+        waiting.places[waiting.count] = place;
+        waiting.count += 1;
+        if waiting.count == TOGETHER {
+            self.place_waiting(brick, stats);
+        }
     }
 
     /// The vertex of the only component of a cell, in which materials meet.
@@ -243,7 +259,7 @@ impl Workspace {
     }
 
     /// Rounds to the lattice, strictly inside the cell.
-    fn to_lattice(&self, at: [usize; 3], position: DVec3) -> [i32; 3] {
+    pub(super) fn to_lattice(&self, at: [usize; 3], position: DVec3) -> [i32; 3] {
         std::array::from_fn(|a| {
             let units = ((position[a] + 0.5) * self.cell_units as f64).round() as i64;
             let units = units.clamp(INSET_UNITS, self.cell_units - INSET_UNITS);

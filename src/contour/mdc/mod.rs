@@ -30,6 +30,7 @@ mod loaded;
 mod look;
 mod neighbourhood;
 mod patch_surfaces;
+mod plain;
 mod polygons;
 mod reach;
 mod separate;

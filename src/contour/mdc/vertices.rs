@@ -15,6 +15,7 @@ use crate::contour::mdc::features::{Halo, Place};
 use crate::contour::mdc::joined_faces::Beyond;
 use crate::contour::mdc::leaf_vertex::WaitingCells;
 use crate::contour::mdc::patch_surfaces::PatchSurfaces;
+use crate::contour::mdc::plain::later;
 use crate::contour::mdc::{INSET_UNITS, flags_of};
 use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method, SurfaceDetail};
 use crate::geom::qef::QefOptions;
@@ -122,7 +123,7 @@ pub struct Workspace {
     pub(super) qef: QefOptions,
     pub(super) method: Method,
     touched: Touched,
-    marks: EdgeBits,
+    pub(super) marks: EdgeBits,
     pub(super) signs: CornerBits,
     /// First crossing of each row of edges.
     row_starts: Vec<u32>,
@@ -221,15 +222,17 @@ impl Workspace {
             }
         }
         self.place_waiting(&mut brick, &mut stats);
-        if let Some(clustering) = &mut self.clustering {
+        if let Some(mut clustering) = self.clustering.take() {
             self.leaves.components.push(brick.positions.len() as u32);
             self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
             clustering.cut(&mut brick, &self.leaves);
             stats.refused_by_error += clustering.refusals.by_error;
             stats.refused_by_shape += clustering.refusals.by_shape;
             stats.cluster_error_cells = clustering.refusals.largest_error;
+            self.place_remaining(&mut brick, &mut stats);
             brick.drop_covered_reaches();
             brick.summary = clustering.summary(&brick, &self.leaves);
+            self.clustering = Some(clustering);
         }
         for list in [&mut brick.surfaces, &mut brick.sources] {
             if list.iter().all(|one| *one == list[0]) {
@@ -351,8 +354,11 @@ impl Workspace {
             if is_clustering {
                 self.add_leaf(at, mask, &around, &border);
             }
-            if border.is_none() {
-                self.place_alone(Place { signs, key }, at, &around, brick, stats)?;
+            let place = Place { signs, key };
+            if border.is_none() && is_clustering && self.is_plain(place, at, &around)? {
+                brick.positions.push(later(brick.cells.len()));
+            } else if border.is_none() {
+                self.place_alone(place, at, &around, brick, stats)?;
             } else {
                 self.place_on_border(at, &around, &border, brick, stats);
             }

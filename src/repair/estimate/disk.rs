@@ -88,12 +88,15 @@ const UNNUMBERED_TAPE_BYTES: f64 = 200.0;
 /// A triangle in the cells where pairs meet: 24 bytes, more where parcels are small, a fifth of them
 /// in several cells.
 pub const CELL_TRIANGLE_BYTES: f64 = 60.0;
-/// A triangle that is compared: on tape, with its place along a curve, and the boxes around it.
+/// A triangle that is compared: on tape, as a run of its own, that with its place along a curve, and the
+/// boxes around it.
 const MEASURED_BYTES: f64 = 80.0;
-const MEASURED_SORT_BYTES: f64 = 96.0;
-const BOX_BYTES: f64 = 48.0 / 7.0;
-/// The edges of a triangle while sharp ones are sought, and all of them sharp.
+const RUN_BYTES: f64 = 72.0;
+const MEASURED_SORT_BYTES: f64 = 88.0;
+const BOX_BYTES: f64 = 56.0 * 8.0 / 7.0;
+/// The edges of a triangle while sharp ones are sought, those of flat pairs, and all of them sharp.
 pub const MEASURED_EDGES_BYTES: f64 = 3.0 * 24.0;
+const MEASURED_PAIRS_BYTES: f64 = 1.5 * 16.0;
 const MEASURED_CREASES_BYTES: f64 = 1.5 * 96.0;
 /// Samples and corners of a surface, sorted and in order, and their distances.
 const MEASURED_SAMPLES_BYTES: f64 = 2.0 * SAMPLES as f64 * (2.0 * 112.0 + 16.0);
@@ -422,17 +425,20 @@ impl DiskModel<'_> {
             + spilled(added, ORDER_BYTES / BIN_SORT_BYTES, share / 4.0)
     }
 
-    /// What the comparison and the reader of the written file spill: the soup on tape, in order and in
-    /// its tree, the output on tape, which is its tree.
+    /// What the comparison and the reader of the written file spill: both surfaces on tape, where no
+    /// triangle lies beside the one before it, and one of them while its tree is made.
     fn measuring(&self, triangles: f64) -> f64 {
         let share = self.plan.share_bytes as f64 / 4.0 * 3.0;
         let most = &self.counts.at_most;
-        let read = |count: f64| {
+        let tree = |count: f64| {
             spilled(MEASURED_BYTES * count, 0.0, share / 8.0)
-                + spilled(BOX_BYTES * count, 0.0, share / 64.0)
+                + spilled(BOX_BYTES * count, 0.0, share / 16.0)
         };
         let order = ORDER_BYTES / MEASURED_SORT_BYTES;
-        let sorted = spilled(MEASURED_SORT_BYTES * triangles, order, share / 8.0);
+        let sorted = |count: f64| {
+            spilled(RUN_BYTES * count, 0.0, share / 16.0)
+                + spilled(MEASURED_SORT_BYTES * count, order, share / 8.0)
+        };
         let positions = match self.format.has_indices() {
             true => spilled(POSITION_BYTES * most.vertices as f64, 0.0, share / 8.0),
             false => 0.0,
@@ -440,10 +446,11 @@ impl DiskModel<'_> {
         let samples = 2.0 * spilled(MEASURED_SAMPLES_BYTES, 0.0, share / 16.0);
         let written = most.triangles as f64;
         let creases = |count: f64| spilled(MEASURED_CREASES_BYTES * count, 0.0, share / 16.0);
-        let order = ORDER_BYTES / MEASURED_EDGES_BYTES;
-        let edges = spilled(MEASURED_EDGES_BYTES * triangles.max(written), order, share / 16.0);
+        let larger = triangles.max(written);
+        let edges = spilled(MEASURED_EDGES_BYTES * larger, 0.0, share / 32.0)
+            + spilled(MEASURED_PAIRS_BYTES * larger, 0.0, share / 32.0);
         let creases = creases(triangles) + creases(written) + edges;
-        2.0 * read(triangles) + sorted + read(written) + positions + samples + creases
+        tree(triangles) + tree(written) + sorted(larger) + positions + samples + creases
     }
 
     /// What the proof and the reader of the written file spill.

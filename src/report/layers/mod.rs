@@ -198,8 +198,7 @@ impl Layers<'_> {
         let target = {
             let mut source = self.open(other)?;
             let mut source = self.converted(other, &mut source);
-            // Contouring writes neighbours after each other.
-            let target = Target::read(&mut source, other == self.output, &means);
+            let target = Target::read(&mut source, &means);
             target.map_err(|error| LayersError::deviate(other, error))?
         };
         let too_large = || LayersError::TooLarge { path: other.to_path_buf() };

@@ -57,7 +57,7 @@ impl<'m> Ruler<'m> {
     ) -> Result<Option<Target>, PreviewError<E>> {
         let Some(mut source) = scene.open(side)? else { return Ok(None) };
         // Contouring writes neighbours after each other.
-        let target = Target::read(&mut *source, side == Side::Output, &self.means());
+        let target = Target::read(&mut *source, &self.means());
         target.map_err(|error| match error {
             DeviateError::Source { source } => PreviewError::Source { side, source },
             DeviateError::Store(error) => PreviewError::measure(error),

@@ -12,7 +12,7 @@ use crate::store::brick::layout::{
     DirectoryEntry, MAGIC, WINDOW_BYTES, check_header, read_directory,
 };
 use crate::store::mapped::map;
-use crate::store::{FileState, Scratch, ScratchFile, StoreError, digest};
+use crate::store::{FileState, Scratch, ScratchFile, StoreError, part_digest};
 
 /// A finished brick file. Shared freely between threads.
 pub struct BrickFile {
@@ -174,7 +174,7 @@ impl BrickFile {
             return Ok(());
         }
         let entry = self.directory[number];
-        let found = digest(bytes);
+        let found = part_digest(bytes);
         if found != entry.hash {
             let path = match &self.bytes {
                 Bytes::Mapped { file, .. } => file.path(),

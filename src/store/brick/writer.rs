@@ -11,7 +11,7 @@ use crate::store::brick::layout::{
     check_header, directory_name, header, read_directory,
 };
 use crate::store::mapped::map_new;
-use crate::store::{Backing, Digester, FileState, Scratch, ScratchFile, StoreError, digest};
+use crate::store::{Backing, Digester, FileState, Scratch, ScratchFile, StoreError, part_digest};
 
 /// Writes a brick file, record by record.
 pub struct BrickWriter {
@@ -156,7 +156,7 @@ impl BrickWriter {
             }
             Target::Mapped(target) => target.append(bytes)?,
         };
-        let hash = digest(bytes);
+        let hash = part_digest(bytes);
         self.directory.push(DirectoryEntry { key, offset, len_bytes, flags, hash });
         Ok(())
     }

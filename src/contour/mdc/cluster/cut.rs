@@ -85,10 +85,10 @@ impl Cut<'_> {
         self.leaves.components[rank] as usize + component
     }
 
-    /// The crossings of a component.
-    pub fn hits_of(&self, component: usize) -> &[PlaneHit] {
+    /// The crossings of these components.
+    pub fn hits_in(&self, components: Range<usize>) -> &[PlaneHit] {
         let starts = &self.leaves.hit_starts;
-        &self.leaves.hits[starts[component] as usize..starts[component + 1] as usize]
+        &self.leaves.hits[starts[components.start] as usize..starts[components.end] as usize]
     }
 }
 

@@ -48,16 +48,19 @@ impl Clustering {
         placed.clear();
         let mut largest = 0.0_f64;
         let mut is_near = true;
-        let fits = (first_node..self.nodes.len()).all(|node| match self.place(cut, cell, node) {
-            Placed::Fits(vertex, error) => {
-                placed.push(vertex);
-                largest = largest.max(error);
-                true
-            }
-            Placed::Outside => false,
-            Placed::TooFar => {
-                is_near = false;
-                false
+        let is_alone = self.nodes.len() == first_node + 1;
+        let fits = (first_node..self.nodes.len()).all(|node| {
+            match self.place(cut, cell, node, is_alone) {
+                Placed::Fits(vertex, error) => {
+                    placed.push(vertex);
+                    largest = largest.max(error);
+                    true
+                }
+                Placed::Outside => false,
+                Placed::TooFar => {
+                    is_near = false;
+                    false
+                }
             }
         });
         let fits = fits && self.keeps_corners(cut, cell, first_node, &placed);
@@ -116,8 +119,8 @@ impl Clustering {
         })
     }
 
-    /// Places the vertex of a piece.
-    fn place(&self, cut: &Cut, cell: &Cell, number: usize) -> Placed {
+    /// Places the vertex of a piece; `is_alone` tells that it is all that the cell has.
+    fn place(&self, cut: &Cut, cell: &Cell, number: usize, is_alone: bool) -> Placed {
         let node = &self.nodes[number];
         let ClusterOptions { cell_units, inset_units, .. } = self.options;
         let size = (1 << cell.level) as f64;
@@ -142,16 +145,17 @@ impl Clustering {
             units.clamp(low + inset_units, low + size as i64 * cell_units - inset_units) as i32
         });
         let at = DVec3::from(vertex.map(f64::from)) / cell_units as f64;
-        let threshold = self.options.threshold_cells;
-        let mut largest = 0.0_f64;
-        for component in cut.components_in(&cell.leaves) {
-            if self.node_of[component] as usize == number {
-                largest = largest.max(largest_distance(cut.hits_of(component), planes, at));
-                if largest > threshold {
-                    return Placed::TooFar;
-                }
-            }
-        }
-        Placed::Fits(vertex, largest)
+        let error = |components| {
+            let hits = cut.hits_in(components);
+            largest_distance(hits, planes, at, self.options.threshold_cells)
+        };
+        let all = cut.components_in(&cell.leaves);
+        let largest = if is_alone {
+            error(all)
+        } else {
+            let mut own = all.filter(|component| self.node_of[*component] as usize == number);
+            own.try_fold(0.0_f64, |largest, one| Some(largest.max(error(one..one + 1)?)))
+        };
+        largest.map_or(Placed::TooFar, |error| Placed::Fits(vertex, error))
     }
 }

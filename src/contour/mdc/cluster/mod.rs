@@ -33,7 +33,7 @@ use crate::contour::mdc::cell::{cell_number, components_of, number_at, place_of,
 use crate::contour::mdc::cluster::corners::Corners;
 use crate::contour::mdc::cluster::cut::Cut;
 use crate::contour::mdc::cluster::node::Node;
-use crate::contour::mdc::cluster::planes::{Group, add_group};
+use crate::contour::mdc::cluster::planes::{Group, add_group, add_hit};
 use crate::geom::qef::QefOptions;
 use crate::octree::{CellBrick, MAX_LEVEL, SIDE};
 
@@ -191,7 +191,8 @@ impl Clustering {
         is_alive
     }
 
-    /// The pieces of a leaf cell, which is in the cut until a larger cell takes its place.
+    /// The pieces of a leaf cell, which is in the cut until a larger cell takes its place. Their crossings
+    /// are added where they are joined.
     fn visit_leaf(&mut self, cut: &mut Cut, rank: usize) {
         let leaves = cut.leaves;
         let components = components_of(cut.brick.cells[rank]);
@@ -199,32 +200,8 @@ impl Clustering {
         for (i, &edges) in components.edge_masks[..usize::from(components.count)].iter().enumerate()
         {
             let component = first + i;
-            let mut node = Node::leaf(edges);
-            node.first_group = self.groups.len() as u32;
-            let mut fits = true;
-            for hit in cut.hits_of(component) {
-                let point = DVec3::from(hit.point.map(f64::from));
-                node.points += point;
-                node.count += 1.0;
-                if hit.plane & JUDGES_ONLY == 0 && fits {
-                    let group = Group::of(hit, &leaves.planes);
-                    let from = node.first_group as usize;
-                    fits = add_group(
-                        &mut self.groups,
-                        from,
-                        &group,
-                        &leaves.planes,
-                        self.cosine_squared,
-                    );
-                }
-            }
-            node.groups = self.groups.len() as u32 - node.first_group;
-            if !fits {
-                self.groups.truncate(node.first_group as usize);
-                node.groups = Node::TOO_MANY;
-            }
             self.node_of[component] = self.nodes.len() as u32;
-            self.nodes.push(node);
+            self.nodes.push(Node::leaf(edges));
             cut.brick.positions.push(cut.positions[component]);
         }
     }
@@ -250,7 +227,11 @@ impl Clustering {
         let pieces = (0..count).filter(|i| self.joined[*i] as usize == *i).count();
         self.merged.resize(pieces, Node::EMPTY);
         self.number_and_add(first_node, octants, child_ends);
-        self.merge_groups(&cut.leaves.planes, first_node, first_group);
+        if cell.level == 1 {
+            self.group_hits(cut, cell);
+        } else {
+            self.merge_groups(&cut.leaves.planes, first_node, first_group);
+        }
         let components = cut.components_in(&cell.leaves);
         for node in &mut self.node_of[components] {
             *node = first_node as u32 + self.joined[*node as usize - first_node];
@@ -285,12 +266,17 @@ impl Clustering {
     /// Joins pieces that share an arc on the planes that halve the cell.
     fn join_across(&mut self, cut: &Cut, cell: &Cell, first_node: usize) {
         let half = 1 << (cell.level - 1);
-        let low_bits = 2 * half - 1;
+        // Of a cell beyond the plane across the first axis the place ends in a one and zeros.
+        let (low_bits, beyond) = (number_at([2 * half - 1, 0, 0]), number_at([half, 0, 0]));
         for rank in cell.leaves.clone() {
             let packed = cut.brick.cells[rank];
-            let at = place_of(cell_number(packed));
+            let number = cell_number(packed);
+            if (0..3).all(|axis| number >> axis & low_bits != beyond) {
+                continue;
+            }
+            let at = place_of(number);
             for axis in 0..3 {
-                if at[axis] & low_bits != half {
+                if number >> axis & low_bits != beyond {
                     continue;
                 }
                 let pairs = segments_on(packed, 2 * axis).pairs();
@@ -310,6 +296,32 @@ impl Clustering {
         }
         for i in 0..self.joined.len() as u32 {
             self.joined[i as usize] = find(&mut self.joined, i);
+        }
+    }
+
+    /// The crossings of the new pieces of a cell whose children are leaves, and their groups.
+    fn group_hits(&mut self, cut: &Cut, cell: &Cell) {
+        let planes = &cut.leaves.planes;
+        let components = cut.components_in(&cell.leaves);
+        for (number, node) in self.merged.iter_mut().enumerate() {
+            let from = self.groups.len();
+            let mut fits = true;
+            let joined = components.clone().zip(&self.joined);
+            for (component, _) in joined.filter(|(_, n)| **n as usize == number) {
+                for hit in cut.hits_in(component..component + 1) {
+                    node.points += DVec3::from(hit.point.map(f64::from));
+                    node.count += 1.0;
+                    if hit.plane & JUDGES_ONLY == 0 && fits {
+                        fits = add_hit(&mut self.groups, from, hit, planes, self.cosine_squared);
+                    }
+                }
+            }
+            node.first_group = from as u32;
+            node.groups = (self.groups.len() - from) as u32;
+            if !fits {
+                self.groups.truncate(from);
+                node.groups = Node::TOO_MANY;
+            }
         }
     }
 

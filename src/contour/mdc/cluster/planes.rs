@@ -104,6 +104,25 @@ impl Group {
     }
 }
 
+/// Adds a crossing to a list of groups that starts at `from`; false if there is no room.
+#[inline]
+pub fn add_hit(
+    groups: &mut Vec<Group>,
+    from: usize,
+    hit: &PlaneHit,
+    planes: &[CellPlane],
+    cosine_squared: f64,
+) -> bool {
+    // Most cells have one group.
+    if let Some(known) = groups.get_mut(from).filter(|known| known.plane == hit.plane) {
+        known.normals += planes[hit.plane as usize].normal;
+        known.points += DVec3::from(hit.point.map(f64::from));
+        known.count += 1.0;
+        return true;
+    }
+    add_group(groups, from, &Group::of(hit, planes), planes, cosine_squared)
+}
+
 /// Adds `group` to a list of groups that starts at `from`; false if there is no room.
 pub fn add_group(
     groups: &mut Vec<Group>,
@@ -138,11 +157,26 @@ pub fn place(
     solve(&hits[..groups.len().max(1)], options)
 }
 
-/// The largest distance of `vertex` to the planes of `hits`.
+/// The largest distance of `vertex` to the planes of `hits`; `None` if one is beyond the threshold.
 #[inline]
-pub fn largest_distance(hits: &[PlaneHit], planes: &[CellPlane], vertex: DVec3) -> f64 {
-    hits.iter().fold(0.0, |largest, hit| {
+pub fn largest_distance(
+    hits: &[PlaneHit],
+    planes: &[CellPlane],
+    vertex: DVec3,
+    threshold: f64,
+) -> Option<f64> {
+    let (mut largest, mut last) = (0.0_f64, u32::MAX);
+    for hit in hits {
+        // Neighbours often are on one plane.
+        if hit.plane == last {
+            continue;
+        }
+        last = hit.plane;
         let plane = &planes[(hit.plane & !JUDGES_ONLY) as usize];
-        largest.max((plane.normal.dot(vertex) - plane.offset).abs())
-    })
+        largest = largest.max((plane.normal.dot(vertex) - plane.offset).abs());
+        if largest > threshold {
+            return None;
+        }
+    }
+    Some(largest)
 }
