@@ -6,9 +6,10 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::Means;
-use crate::deviate::reading::{BLOCK, TapeWriter};
+use crate::deviate::reading::TapeWriter;
 use crate::deviate::samples::Spread;
 use crate::deviate::tree::{Curve, Tree};
+use crate::deviate::triangles::BLOCK;
 use crate::store::{Record, Sequence, Sorter, StoreError};
 
 /// Square of the cosine of 30 degrees.
@@ -63,7 +64,7 @@ impl Creases {
     }
 
     /// A tree around them, as triangles with two corners in one place.
-    pub(crate) fn tree(&self, means: &Means<'_>) -> Result<Tree, StoreError> {
+    pub(crate) fn tree(&self, means: &Means<'_>) -> Result<Tree<'static>, StoreError> {
         let mut tape = TapeWriter::new(means);
         self.list.each_block(BLOCK, |block| {
             means.stop_if_asked()?;

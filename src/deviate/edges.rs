@@ -15,7 +15,8 @@ use glam::{DVec3, Vec3};
 
 use crate::deviate::Means;
 use crate::deviate::creases::{Crease, Creases, SHARP_COSINE_SQUARED};
-use crate::deviate::reading::{BLOCK, Tape, Triangle, hash_of};
+use crate::deviate::reading::{Tape, hash_of};
+use crate::deviate::triangles::{BLOCK, Blocks, Triangle};
 use crate::geom::mix;
 use crate::store::{Record, Sequence, Sorter, StoreError};
 
@@ -220,7 +221,7 @@ struct Open {
 
 /// Judges edges, all uses of one hash after those of another.
 struct Judge<'t> {
-    tape: &'t Tape,
+    tape: &'t Tape<'t>,
     creases: Creases,
     /// The first uses of a hash, at most two: most edges are flat, and their triangles are not read.
     waiting: Vec<EdgeUse>,

@@ -1,8 +1,9 @@
 //! The deviation: how far two surfaces lie apart, what of one the other lacks, and which creases it
 //! kept.
 //!
-//! In:         two surfaces as [`MeshSource`]s, each read once into a [`Surface`]: triangles in a
-//!             tree of boxes, samples spread evenly over their area, and their sharp edges.
+//! In:         two surfaces as [`MeshSource`]s, or a soup that was read before, each read once into a
+//!             [`Surface`]: triangles in a tree of boxes, samples spread evenly over their area, and
+//!             their sharp edges.
 //! Out:        a [`Deviation`]: distances both ways, normals, what is lost and invented, creases. Or, of a
 //!             [`Target`], the distance of whatever points are asked for, or the [`Piece`]s of
 //!             another surface that lie farther from it than some length.
@@ -11,8 +12,8 @@
 //! Units:      model units, the same in both files; angles in degrees.
 //! Memory:     about half of the share for each surface while it is read, half for both together
 //!             while they are compared; beyond that, scratch files without names: 108 bytes a
-//!             triangle, 300 where none lies beside the one before it in the file, and up to 96 more
-//!             while sharp edges are sought.
+//!             triangle, 300 where none lies beside the one before it in the file, 80 less of a soup,
+//!             which stays where it is, and up to 96 more while sharp edges are sought.
 //! Fails:      [`DeviateError`]: a source, the scratch disk, or a request to stop. Surfaces that
 //!             have no area, or are too large for their squares, give no deviation.
 //! Source:     Cignoni, Rocchini, Scopigno 1998, Metro (distances by samples); Roussopoulos, Kelley,
@@ -41,6 +42,7 @@ mod target;
 #[cfg(test)]
 mod tests;
 mod tree;
+mod triangles;
 
 pub use apart::Gap;
 pub use compare::compare;

@@ -3,10 +3,10 @@
 use glam::DVec3;
 
 use crate::deviate::pages::Pages;
-use crate::deviate::reading::Triangle;
 use crate::deviate::tree::{Bounds, Node, Tree};
+use crate::deviate::triangles::{Triangle, Triangles};
 use crate::geom::{are_within, closest_on_triangle};
-use crate::store::StoreError;
+use crate::store::{Sequence, StoreError};
 
 /// What is nearest to a point.
 #[derive(Clone, Copy)]
@@ -107,8 +107,8 @@ impl Open {
 
 /// A walker of one tree; each worker has its own.
 pub(crate) struct Walker<'t> {
-    triangles: Pages<'t, Triangle>,
-    levels: Vec<Pages<'t, Node>>,
+    triangles: Pages<'t, Triangles<'t>>,
+    levels: Vec<Pages<'t, Sequence<Node>>>,
     /// Boxes to look into, the next one last.
     stack: Vec<Open>,
     /// What the last point had nearest: a good guess for the next.
@@ -117,7 +117,7 @@ pub(crate) struct Walker<'t> {
 
 impl<'t> Walker<'t> {
     /// A walker whose pages take about `share_bytes`.
-    pub(crate) fn new(tree: &'t Tree, share_bytes: u64) -> Self {
+    pub(crate) fn new(tree: &'t Tree<'_>, share_bytes: u64) -> Self {
         let levels = tree.levels.iter().map(|level| Pages::new(level, share_bytes / 8));
         Self {
             triangles: Pages::new(&tree.triangles, share_bytes / 2),

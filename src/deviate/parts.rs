@@ -11,13 +11,14 @@ use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::nearest::Walker;
-use crate::deviate::reading::{BLOCK, Tape, Triangle, read};
+use crate::deviate::reading::{Tape, read};
 use crate::deviate::samples::{Spread, point_within};
 use crate::deviate::sight::Sight;
 use crate::deviate::tree::{Curve, Tree};
+use crate::deviate::triangles::{BLOCK, Blocks, Triangle, Triangles};
 use crate::deviate::{DeviateError, Means};
 use crate::mesh::MeshSource;
-use crate::store::{Sequence, StoreError, Table, ordered};
+use crate::store::{StoreError, Table, ordered};
 
 /// Points that are looked at of a part, until one is seen.
 const SAMPLES_OF_PART: u64 = 64;
@@ -100,13 +101,13 @@ fn look(
 
 /// Looks at parts; each worker has its own.
 struct Looker<'t> {
-    triangles: &'t Sequence<Triangle>,
+    triangles: &'t Triangles<'t>,
     sight: Sight<'t>,
     room: Vec<Triangle>,
 }
 
 impl<'t> Looker<'t> {
-    fn new(tree: &'t Tree, bounds: [[f64; 3]; 2], means: &Means<'_>) -> Self {
+    fn new(tree: &'t Tree<'_>, bounds: [[f64; 3]; 2], means: &Means<'_>) -> Self {
         let share_bytes = means.share_bytes / 8 / means.pool.current_num_threads() as u64;
         let extent = Curve::new(bounds).extent;
         let sight = Sight::new(Walker::new(tree, share_bytes), extent);

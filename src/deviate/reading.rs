@@ -3,49 +3,15 @@
 //!
 //! Memory:     three sixteenths of the share.
 
-use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
 use crate::deviate::runs::{Run, Runs};
+use crate::deviate::triangles::{BLOCK, Triangle, Triangles, each_of_soup};
 use crate::deviate::{DeviateError, Means};
 use crate::geom::mix_words;
 use crate::mesh::{MeshSource, TriangleBatch};
-use crate::store::{Sequence, StoreError};
-
-/// Triangles at one time on their way from a tape.
-pub(crate) const BLOCK: usize = 1024;
-
-/// A triangle as it was read.
-#[derive(Clone, Copy, Pod, Zeroable)]
-#[repr(C)]
-pub(crate) struct Triangle {
-    pub(crate) corners: [[f64; 3]; 3],
-    /// Its number among those with finite corners.
-    pub(crate) number: u32,
-    /// 1 where light passes, else 0.
-    pub(crate) is_pane: u32,
-}
-
-impl Triangle {
-    #[inline]
-    pub(crate) fn points(&self) -> [DVec3; 3] {
-        let [a, b, c] = self.corners;
-        [DVec3::from_array(a), DVec3::from_array(b), DVec3::from_array(c)]
-    }
-
-    /// Its area.
-    #[inline]
-    pub(crate) fn area(&self) -> f64 {
-        self.normal().length() / 2.0
-    }
-
-    /// Its normal, twice as long as its area is large.
-    #[inline]
-    pub(crate) fn normal(&self) -> DVec3 {
-        let [a, b, c] = self.points();
-        (b - a).cross(c - a)
-    }
-}
+use crate::octree::SoupTriangle;
+use crate::store::{Sequence, Spool, StoreError};
 
 /// A hash of numbers, the same for both zeros.
 #[inline]
@@ -54,8 +20,8 @@ pub(crate) fn hash_of(numbers: &[f64]) -> u64 {
 }
 
 /// A surface that was read.
-pub(crate) struct Tape {
-    pub(crate) triangles: Sequence<Triangle>,
+pub(crate) struct Tape<'s> {
+    pub(crate) triangles: Triangles<'s>,
     /// All triangles again, in runs of neighbours.
     pub(crate) runs: Sequence<Run>,
     /// Lowest and highest corner.
@@ -63,7 +29,7 @@ pub(crate) struct Tape {
     pub(crate) area: f64,
 }
 
-impl Tape {
+impl Tape<'_> {
     /// Whether distances within the surface have squares, and its area is one.
     pub(crate) fn is_measurable(&self) -> bool {
         let [low, high] = self.bounds.map(DVec3::from);
@@ -72,25 +38,46 @@ impl Tape {
     }
 }
 
-/// A tape while triangles come.
-pub(crate) struct TapeWriter {
-    triangles: Sequence<Triangle>,
+/// What is known of triangles while they come.
+struct Survey {
     runs: Runs,
     low: DVec3,
     high: DVec3,
     area: f64,
 }
 
+impl Survey {
+    fn new(means: &Means<'_>) -> Self {
+        let (low, high) = (DVec3::INFINITY, DVec3::NEG_INFINITY);
+        Self { runs: Runs::new(means), low, high, area: 0.0 }
+    }
+
+    fn add(&mut self, triangle: &Triangle) -> Result<(), StoreError> {
+        let [a, b, c] = triangle.points();
+        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
+        (self.low, self.high) = (self.low.min(low), self.high.max(high));
+        let area = triangle.area();
+        self.area += area;
+        self.runs.add(triangle, [low, high], area)
+    }
+
+    fn finish(self, triangles: Triangles<'_>) -> Result<Tape<'_>, StoreError> {
+        let bounds = [self.low.into(), self.high.into()];
+        Ok(Tape { triangles, runs: self.runs.finish()?, bounds, area: self.area })
+    }
+}
+
+/// A tape while triangles come.
+pub(crate) struct TapeWriter {
+    triangles: Sequence<Triangle>,
+    survey: Survey,
+}
+
 impl TapeWriter {
     /// No triangles yet.
     pub(crate) fn new(means: &Means<'_>) -> Self {
-        Self {
-            triangles: Sequence::new(means.scratch, means.share_bytes / 8),
-            runs: Runs::new(means),
-            low: DVec3::INFINITY,
-            high: DVec3::NEG_INFINITY,
-            area: 0.0,
-        }
+        let triangles = Sequence::new(means.scratch, means.share_bytes / 8);
+        Self { triangles, survey: Survey::new(means) }
     }
 
     /// Takes in a triangle with finite corners, and tells how it stands on the tape.
@@ -101,25 +88,33 @@ impl TapeWriter {
     ) -> Result<Triangle, StoreError> {
         let number = self.triangles.len() as u32;
         let triangle = Triangle { corners: *corners, number, is_pane: u32::from(is_pane) };
-        let [a, b, c] = triangle.points();
-        let (low, high) = (a.min(b).min(c), a.max(b).max(c));
-        (self.low, self.high) = (self.low.min(low), self.high.max(high));
-        let area = triangle.area();
-        self.area += area;
-        self.runs.add(&triangle, [low, high], area)?;
+        self.survey.add(&triangle)?;
         self.triangles.push(triangle)?;
         Ok(triangle)
     }
 
     /// All that came.
-    pub(crate) fn finish(self) -> Result<Tape, StoreError> {
-        Ok(Tape {
-            triangles: self.triangles,
-            runs: self.runs.finish()?,
-            bounds: [self.low.into(), self.high.into()],
-            area: self.area,
-        })
+    pub(crate) fn finish(self) -> Result<Tape<'static>, StoreError> {
+        self.survey.finish(Triangles::Taped(self.triangles))
     }
+}
+
+/// Goes through a soup, which is finite, and leaves its triangles where they are; `note` hears of each.
+pub(crate) fn survey_soup<'s>(
+    spool: &'s Spool<SoupTriangle>,
+    means: &Means<'_>,
+    mut note: impl FnMut(&Triangle) -> Result<(), StoreError>,
+) -> Result<Tape<'s>, StoreError> {
+    let mut survey = Survey::new(means);
+    each_of_soup(spool, |triangle| {
+        if u64::from(triangle.number).is_multiple_of(BLOCK as u64) {
+            means.stop_if_asked()?;
+            means.monitor.advance((spool.len() - u64::from(triangle.number)).min(BLOCK as u64));
+        }
+        survey.add(triangle)?;
+        note(triangle)
+    })?;
+    survey.finish(Triangles::Spooled(spool))
 }
 
 /// Reads `source` to its end; `note` hears of each triangle with the number of its part.
@@ -127,7 +122,7 @@ pub(crate) fn read<S: MeshSource + ?Sized>(
     source: &mut S,
     means: &Means<'_>,
     mut note: impl FnMut(u32, &Triangle) -> Result<(), StoreError>,
-) -> Result<Tape, DeviateError<S::Error>> {
+) -> Result<Tape<'static>, DeviateError<S::Error>> {
     let failed = |source| DeviateError::Source { source };
     let mut tape = TapeWriter::new(means);
     let mut batch = TriangleBatch::default();

@@ -12,8 +12,9 @@ use glam::DVec3;
 
 use crate::deviate::Means;
 use crate::deviate::pages::PAGE;
-use crate::deviate::reading::{Triangle, hash_of};
+use crate::deviate::reading::hash_of;
 use crate::deviate::tree::{Bounds, GROUP, Node};
+use crate::deviate::triangles::Triangle;
 use crate::geom::mix;
 use crate::store::{Sequence, StoreError};
 

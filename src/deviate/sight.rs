@@ -8,7 +8,7 @@
 use glam::DVec3;
 
 use crate::deviate::nearest::{Walker, is_met};
-use crate::deviate::reading::Triangle;
+use crate::deviate::triangles::Triangle;
 use crate::store::StoreError;
 
 /// Directions that are looked along.

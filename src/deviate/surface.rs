@@ -4,12 +4,13 @@
 
 use crate::deviate::creases::Creases;
 use crate::deviate::edges::EdgeFinder;
-use crate::deviate::reading::read;
+use crate::deviate::reading::{Tape, read, survey_soup};
 use crate::deviate::samples::{Sample, take_samples};
 use crate::deviate::tree::Tree;
 use crate::deviate::{DeviateError, Means};
 use crate::mesh::MeshSource;
-use crate::store::Sequence;
+use crate::octree::SoupTriangle;
+use crate::store::{Sequence, Spool, StoreError};
 
 /// What is asked of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -21,14 +22,14 @@ pub struct SurfaceOptions {
 }
 
 /// A surface that is ready to be compared.
-pub struct Surface {
+pub struct Surface<'s> {
     pub(crate) bounds: [[f64; 3]; 2],
-    pub(crate) tree: Tree,
+    pub(crate) tree: Tree<'s>,
     pub(crate) samples: Sequence<Sample>,
     pub(crate) creases: Option<Creases>,
 }
 
-impl Surface {
+impl Surface<'static> {
     /// Reads `source` to its end; `None` if it has no area, or is so large that squares of its
     /// lengths are no numbers. Triangles with infinite corners are left out.
     ///
@@ -43,6 +44,33 @@ impl Surface {
         let tape = read(source, means, |_, triangle| {
             finder.as_mut().map_or(Ok(()), |finder| finder.add(triangle))
         })?;
+        Ok(Self::around(tape, finder, options, means)?)
+    }
+}
+
+impl<'s> Surface<'s> {
+    /// The same of a soup that was read before, whose triangles stay where they are.
+    ///
+    /// # Errors
+    /// The scratch disk fails, or the caller cancels.
+    pub fn of_soup(
+        soup: &'s Spool<SoupTriangle>,
+        options: &SurfaceOptions,
+        means: &Means<'_>,
+    ) -> Result<Option<Self>, StoreError> {
+        let mut finder = options.creases.then(|| EdgeFinder::new(means));
+        let tape = survey_soup(soup, means, |triangle| {
+            finder.as_mut().map_or(Ok(()), |finder| finder.add(triangle))
+        })?;
+        Self::around(tape, finder, options, means)
+    }
+
+    fn around(
+        tape: Tape<'s>,
+        finder: Option<EdgeFinder<'_>>,
+        options: &SurfaceOptions,
+        means: &Means<'_>,
+    ) -> Result<Option<Self>, StoreError> {
         if !tape.is_measurable() {
             return Ok(None);
         }

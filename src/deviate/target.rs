@@ -19,7 +19,7 @@ const CHUNK: usize = 512;
 
 /// A surface that points are measured against.
 pub struct Target {
-    pub(crate) tree: Tree,
+    pub(crate) tree: Tree<'static>,
     diagonal: f64,
     /// The largest coordinate, without its sign.
     pub(crate) reach: f64,

@@ -4,8 +4,8 @@ use glam::DVec3;
 use rayon::ThreadPool;
 
 use crate::deviate::nearest::near_on;
-use crate::deviate::reading::Triangle;
 use crate::deviate::samples::Sample;
+use crate::deviate::triangles::Triangle;
 use crate::deviate::{
     CreaseReport, Deviation, DeviationOptions, Means, Surface, SurfaceOptions, Target, compare,
 };
@@ -13,7 +13,8 @@ use crate::mesh::shapes::{
     Corners, ListedTriangles, Random, cuboid, rotation, sphere, torus, transform,
 };
 use crate::monitor::Void;
-use crate::store::Scratch;
+use crate::octree::SoupTriangle;
+use crate::store::{Scratch, Spool, SpoolWriter};
 
 const SAMPLES: u64 = 2000;
 const SMALL: u64 = 16 << 10;
@@ -39,17 +40,29 @@ impl Workshop {
         Means { scratch, pool, share_bytes: *share_bytes, monitor: &Void }
     }
 
-    fn read(&self, triangles: &[Corners], samples: u64) -> Surface {
+    fn read(&self, triangles: &[Corners], samples: u64) -> Surface<'static> {
         let mut source = ListedTriangles::without_indices(triangles.to_vec());
-        let options = SurfaceOptions { samples, creases: true };
-        let surface = Surface::read(&mut source, &options, &self.means());
+        let surface = Surface::read(&mut source, &asked(samples), &self.means());
         surface.expect("the scratch disk works").expect("it has an area")
+    }
+
+    fn soup(&self, triangles: &[Corners]) -> Spool<SoupTriangle> {
+        let mut spool = SpoolWriter::create(&self.scratch, "soup.spool").expect("writable");
+        for (source, &corners) in (0..).zip(triangles) {
+            let triangle = SoupTriangle { corners, source, part: 0, material: 0, stands_for: 0 };
+            spool.push(triangle).expect("writable");
+        }
+        spool.finish().expect("writable")
     }
 
     fn compare(&self, one: &[Corners], other: &[Corners], options: &DeviationOptions) -> Deviation {
         let (one, other) = (self.read(one, SAMPLES), self.read(other, SAMPLES));
         compare(&one, &other, options, &self.means()).expect("the scratch disk works")
     }
+}
+
+fn asked(samples: u64) -> SurfaceOptions {
+    SurfaceOptions { samples, creases: true }
 }
 
 fn options(tolerance: f64) -> DeviationOptions {
@@ -122,6 +135,13 @@ fn distances_are_those_of_brute_force_whatever_the_share_and_the_threads() {
             let again = Workshop::new(threads, share_bytes).compare(&one, &other, &options);
             assert_eq!(again, found, "{threads} threads, {share_bytes} bytes");
         }
+        let workshop = Workshop::new(2, SMALL);
+        let soup = workshop.soup(&one);
+        let left_there = Surface::of_soup(&soup, &asked(SAMPLES), &workshop.means());
+        let left_there = left_there.expect("the scratch disk works").expect("it has an area");
+        let other = workshop.read(&other, SAMPLES);
+        let again = compare(&left_there, &other, &options, &workshop.means());
+        assert_eq!(again.expect("the scratch disk works"), found, "in a spool");
     }
 }
 

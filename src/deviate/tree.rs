@@ -14,8 +14,9 @@ use glam::DVec3;
 
 use crate::deviate::Means;
 use crate::deviate::pages::Pages;
-use crate::deviate::reading::{BLOCK, Tape, Triangle};
+use crate::deviate::reading::Tape;
 use crate::deviate::runs::Run;
+use crate::deviate::triangles::{BLOCK, Triangle, Triangles};
 use crate::geom::morton;
 use crate::store::{Record, Sequence, Sorter, StoreError};
 
@@ -110,16 +111,16 @@ impl Record for Placed {
 }
 
 /// Triangles, and boxes around them.
-pub(crate) struct Tree {
-    pub(crate) triangles: Sequence<Triangle>,
+pub(crate) struct Tree<'s> {
+    pub(crate) triangles: Triangles<'s>,
     /// Boxes of runs of triangles, of groups of these, and so on; the last is one box.
     pub(crate) levels: Vec<Sequence<Node>>,
 }
 
-impl Tree {
+impl<'s> Tree<'s> {
     /// Puts boxes around the triangles of a tape. Of runs that are copies of each other one gets a box:
     /// a thousand are no nearer than one, and each would have to be asked.
-    pub(crate) fn around(tape: Tape, means: &Means<'_>) -> Result<Self, StoreError> {
+    pub(crate) fn around(tape: Tape<'s>, means: &Means<'_>) -> Result<Self, StoreError> {
         let Tape { triangles, runs, bounds, .. } = tape;
         let curve = Curve::new(bounds);
         let slack = DVec3::splat(curve.extent * SLACK);
@@ -165,7 +166,7 @@ impl Placed {
 
 /// The last run that got a box, or a copy of it.
 struct Last<'t> {
-    triangles: &'t Sequence<Triangle>,
+    triangles: &'t Triangles<'t>,
     hash: Option<(u64, Node)>,
     /// Its triangles, once they were asked for.
     known: Vec<Triangle>,

@@ -24,9 +24,11 @@ pub fn for_each_touched_brick<E>(
             coordinates[0].min(coordinates[1]).min(coordinates[2]),
             coordinates[0].max(coordinates[1]).max(coordinates[2]),
         );
+        // Within the lattice, which has fewer units a side than a u32: wider division takes longer.
+        let bricks_below = |units: i64| i64::from(units.max(0) as u32 / brick as u32);
         // A coordinate on a border belongs to both sides.
-        lo[axis] = ((least + brick - 1) / brick - 1).clamp(0, last) as u32;
-        hi[axis] = (most / brick).clamp(0, last) as u32;
+        lo[axis] = (bricks_below(least + brick - 1) - 1).clamp(0, last) as u32;
+        hi[axis] = bricks_below(most).clamp(0, last) as u32;
     }
     let span = (0..3).map(|a| hi[a] - lo[a]).max().unwrap_or(0);
     if span <= 1 && (0..3).map(|a| hi[a] - lo[a]).sum::<u32>() <= 1 {

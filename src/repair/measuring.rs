@@ -9,13 +9,12 @@ use crate::deviate::{
 };
 use crate::ingest::SOUP;
 use crate::io::{Format, IoError, ReadOptions};
-use crate::mesh::{Discarded, Material, MeshSource, TriangleBatch};
-use crate::octree::{SoupTriangle, TRANSPARENT};
+use crate::mesh::MeshSource;
 use crate::repair::RepairError;
 use crate::repair::run::Run;
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
-use crate::store::{FileState, Resources, Spool, SpoolReader, StoreError};
+use crate::store::{FileState, Resources, Spool};
 
 /// Samples of each surface: a share of a twentieth is told within a hundredth.
 pub const SAMPLES: u64 = 4000;
@@ -67,11 +66,7 @@ impl Run<'_> {
         let means = Means { scratch, pool, share_bytes: resources.share_bytes / 4 * 3, monitor };
         let asked = SurfaceOptions { samples: SAMPLES, creases: true };
         let soup = Spool::open(scratch, soup)?;
-        let mut soup = SoupSource::new(&soup);
-        let before = Surface::read(&mut soup, &asked, &means);
-        let before = before.map_err(|error| match error {
-            DeviateError::Source { source } | DeviateError::Store(source) => source,
-        })?;
+        let before = Surface::of_soup(&soup, &asked, &means)?;
         let after = Surface::read(file, &asked, &means).map_err(|error| match error {
             DeviateError::Source { source } => RepairError::ReadBack(source),
             DeviateError::Store(source) => RepairError::Store(source),
@@ -120,46 +115,5 @@ pub fn deviation_reasons(findings: &Findings, output_area: f64, reasons: &mut Ve
              closes nothing that was open",
             deviation.invented_share * 100.0
         ));
-    }
-}
-
-/// The soup as it was read.
-struct SoupSource<'s> {
-    reader: SpoolReader<'s, SoupTriangle>,
-}
-
-impl<'s> SoupSource<'s> {
-    fn new(soup: &'s Spool<SoupTriangle>) -> Self {
-        Self { reader: soup.reader(0, soup.len()) }
-    }
-}
-
-impl MeshSource for SoupSource<'_> {
-    type Error = StoreError;
-
-    fn next_batch(&mut self, batch: &mut TriangleBatch) -> Result<bool, StoreError> {
-        batch.clear();
-        let Some(triangles) = self.reader.next_block()? else { return Ok(false) };
-        for triangle in triangles {
-            batch.push(triangle.corners, triangle.part, triangle.material, triangle.source);
-        }
-        Ok(true)
-    }
-
-    /// All that the number tells: whether light passes.
-    fn material(&mut self, number: u32) -> Result<Material, StoreError> {
-        Ok(Material { transparent: number & TRANSPARENT != 0, ..Material::default() })
-    }
-
-    fn discarded(&self) -> Discarded {
-        Discarded::default()
-    }
-
-    fn bytes_read(&self) -> u64 {
-        0
-    }
-
-    fn vertex_count(&self) -> Option<u64> {
-        None
     }
 }

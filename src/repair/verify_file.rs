@@ -193,7 +193,10 @@ impl Verifying<'_> {
     }
 
     /// A surface, and what a unit of its file is.
-    fn read(&self, path: &Path) -> Result<(Option<Surface>, Option<LengthUnit>), RepairError> {
+    fn read(
+        &self,
+        path: &Path,
+    ) -> Result<(Option<Surface<'static>>, Option<LengthUnit>), RepairError> {
         self.monitor.begin(Stage::Deviate, 0);
         let mut source = self.open(path).map_err(RepairError::Input)?;
         let samples = self.settings.samples;

@@ -1,7 +1,7 @@
 //! Read, work, write: items in order through a pool of workers, with back-pressure.
 //!
-//! Memory: at most two items per worker are under way, fewer where they weigh much; feeding waits
-//! until the oldest is taken.
+//! Memory: at most two items per worker are under way, fewer where they weigh much, or light ones in
+//! batches; feeding waits until the oldest is taken.
 
 use std::collections::{BTreeMap, VecDeque};
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
@@ -9,8 +9,12 @@ use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use crossbeam::channel::bounded;
 use rayon::ThreadPool;
 
-/// Items under way per worker.
-const ITEMS_PER_WORKER: usize = 2;
+/// Batches of items under way per worker.
+const BATCHES_PER_WORKER: usize = 2;
+/// Most items of a batch: a worker that is woken for each spends much of its time on that.
+const BATCH_ITEMS: usize = 8;
+/// One item of a batch for so many that went before it, so that few items keep all workers busy.
+const ITEMS_BEFORE: usize = 32;
 
 /// Feeds items to `work` on the threads of `pool` and hands the results to `take` in feeding order.
 ///
@@ -27,7 +31,7 @@ pub fn ordered<I: Send, O: Send, W, E: Send>(
     take: impl FnMut(O) -> Result<(), E>,
 ) -> Result<(), E> {
     let light = Scales { most_bytes: u64::MAX, weigh: |_: &I| 0 };
-    ordered_by_weight(pool, light, feed, workspace, work, take)
+    in_batches(pool, (light, 1), feed, workspace, work, take)
 }
 
 /// What items weigh, and how much may be under way at one time.
@@ -46,6 +50,20 @@ pub struct Scales<F> {
 pub fn ordered_by_weight<I: Send, O: Send, W, E: Send>(
     pool: &ThreadPool,
     scales: Scales<impl Fn(&I) -> u64>,
+    feed: impl FnMut() -> Result<Option<I>, E>,
+    workspace: impl Fn() -> W + Sync,
+    work: impl Fn(&mut W, I) -> Result<O, E> + Sync,
+    take: impl FnMut(O) -> Result<(), E>,
+) -> Result<(), E> {
+    in_batches(pool, (scales, BATCH_ITEMS), feed, workspace, work, take)
+}
+
+/// What a worker made of a batch: up to the first error, or a bug.
+type Worked<O, E> = std::thread::Result<Result<Vec<O>, (Vec<O>, E)>>;
+
+fn in_batches<I: Send, O: Send, W, E: Send>(
+    pool: &ThreadPool,
+    (scales, most_items): (Scales<impl Fn(&I) -> u64>, usize),
     mut feed: impl FnMut() -> Result<Option<I>, E>,
     workspace: impl Fn() -> W + Sync,
     work: impl Fn(&mut W, I) -> Result<O, E> + Sync,
@@ -59,56 +77,123 @@ pub fn ordered_by_weight<I: Send, O: Send, W, E: Send>(
         }
         return Ok(());
     }
-    let limit = workers * ITEMS_PER_WORKER;
+    let limit = workers * BATCHES_PER_WORKER;
     pool.in_place_scope(|scope| {
-        let (item_sender, items) = bounded::<(u64, I)>(limit);
-        let (result_sender, results) = bounded::<(u64, std::thread::Result<Result<O, E>>)>(limit);
+        let (batch_sender, batches) = bounded::<(u64, Vec<I>)>(limit);
+        let (result_sender, results) = bounded::<(u64, Worked<O, E>)>(limit);
         for _ in 0..workers {
-            let (items, result_sender) = (items.clone(), result_sender.clone());
+            let (batches, result_sender) = (batches.clone(), result_sender.clone());
             let (workspace, work) = (&workspace, &work);
             scope.spawn(move |_| {
                 let mut space = workspace();
-                for (number, item) in items {
-                    let worked = catch_unwind(AssertUnwindSafe(|| work(&mut space, item)));
+                for (number, batch) in batches {
+                    let worked =
+                        catch_unwind(AssertUnwindSafe(|| work_off(&mut space, batch, work)));
                     if result_sender.send((number, worked)).is_err() {
                         return;
                     }
                 }
             });
         }
-        drop((items, result_sender));
+        drop((batches, result_sender));
         let mut waiting = BTreeMap::new();
-        // Of the items under way, oldest first; a permit that workers take could deadlock, since
-        // results are taken in order.
-        let mut weights = VecDeque::new();
-        let (mut fed, mut taken, mut weight) = (0, 0, 0_u64);
+        let mut under_way =
+            UnderWay { scales, most_items, limit, fed: 0, weights: VecDeque::new() };
+        let (mut sent, mut taken) = (0, 0);
         let mut next = feed()?;
         loop {
-            while let Some(item) = next.take_if(|item| {
-                let more = (scales.weigh)(item);
-                weights.is_empty()
-                    || weights.len() < limit && weight.saturating_add(more) <= scales.most_bytes
-            }) {
-                let more = (scales.weigh)(&item);
-                weights.push_back(more);
-                weight += more;
-                item_sender.send((fed, item)).expect("workers listen until the end");
-                fed += 1;
-                next = feed()?;
+            while let Some(batch) = under_way.next_batch(&mut next, &mut feed)? {
+                batch_sender.send((sent, batch)).expect("workers listen until the end");
+                sent += 1;
             }
-            if taken == fed {
+            if taken == sent {
                 return Ok(());
             }
             let (number, result) = results.recv().expect("workers answer until all is taken");
             // A bug in a worker ends the run: nobody else would tell that its result is missing.
             waiting.insert(number, result.unwrap_or_else(|bug| resume_unwind(bug)));
             while let Some(result) = waiting.remove(&taken) {
-                take(result?)?;
+                let (done, error) = match result {
+                    Ok(done) => (done, None),
+                    Err((done, error)) => (done, Some(error)),
+                };
+                done.into_iter().try_for_each(&mut take)?;
+                error.map_or(Ok(()), Err)?;
                 taken += 1;
-                weight -= weights.pop_front().unwrap_or(0);
+                under_way.weights.pop_front();
             }
         }
     })
+}
+
+/// Works off a batch up to its first error.
+fn work_off<I, O, W, E>(
+    space: &mut W,
+    batch: Vec<I>,
+    work: impl Fn(&mut W, I) -> Result<O, E>,
+) -> Result<Vec<O>, (Vec<O>, E)> {
+    let mut done = Vec::with_capacity(batch.len());
+    for item in batch {
+        match work(space, item) {
+            Ok(result) => done.push(result),
+            Err(error) => return Err((done, error)),
+        }
+    }
+    Ok(done)
+}
+
+/// Batches that were sent and not taken.
+struct UnderWay<F> {
+    scales: Scales<F>,
+    most_items: usize,
+    /// Most batches.
+    limit: usize,
+    /// Items so far.
+    fed: usize,
+    /// What each batch weighs, oldest first; a permit that workers take could deadlock, since results
+    /// are taken in order.
+    weights: VecDeque<u64>,
+}
+
+impl<F> UnderWay<F> {
+    /// The next items, as many as may go now; `next` is the first of those that wait.
+    fn next_batch<I, E>(
+        &mut self,
+        next: &mut Option<I>,
+        feed: &mut impl FnMut() -> Result<Option<I>, E>,
+    ) -> Result<Option<Vec<I>>, E>
+    where
+        F: Fn(&I) -> u64,
+    {
+        if self.weights.len() == self.limit {
+            return Ok(None);
+        }
+        let most_bytes = self.scales.most_bytes;
+        let before: u64 = self.weights.iter().sum();
+        let most_items = (self.fed / ITEMS_BEFORE).clamp(1, self.most_items);
+        let mut batch = Vec::new();
+        let mut weight = 0_u64;
+        while batch.len() < most_items {
+            let fits = |item: &mut I| {
+                let all = before.saturating_add(weight).saturating_add((self.scales.weigh)(item));
+                // A heavy one goes alone; and a batch leaves room for others.
+                if batch.is_empty() {
+                    return all <= most_bytes || self.weights.is_empty();
+                }
+                all <= most_bytes && weight <= most_bytes / self.limit as u64
+            };
+            let Some(item) = next.take_if(fits) else { break };
+            weight += (self.scales.weigh)(&item);
+            batch.push(item);
+            self.fed += 1;
+            *next = feed()?;
+        }
+        if batch.is_empty() {
+            return Ok(None);
+        }
+        self.weights.push_back(weight);
+        Ok(Some(batch))
+    }
 }
 
 #[cfg(test)]

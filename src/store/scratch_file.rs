@@ -87,7 +87,7 @@ impl ScratchFile {
         }
     }
 
-    /// Reserves blocks of the disk, so that a map of them can be written.
+    /// Reserves blocks of the disk, so that they can be mapped whole.
     ///
     /// # Errors
     /// The disk is full, or the limit is reached.

@@ -17,7 +17,7 @@ use glam::DVec3;
 use crate::contour::ContourError;
 use crate::contour::mdc::leaf_vertex::Around;
 use crate::contour::mdc::vertices::Workspace;
-use crate::geom::qef::{Hit, Solution, solve};
+use crate::geom::qef::{Hit, Solution, meet};
 use crate::octree::{
     AXIS_EDGES, BrickKey, LINES, PATCH, SIDE, SourcePlane, decode_signs, edge_position,
 };
@@ -117,8 +117,7 @@ impl Workspace {
             hits[count] = Hit { point, normal };
             count += 1;
         }
-        let met = solve(&hits[..count], &self.qef);
-        (!met.clamped && usize::from(met.rank) == count).then_some(met.position)
+        meet(&hits[..count], &self.qef)
     }
 
     /// The number of the normal on the edge that leaves a corner of a cell outward along `axis`;

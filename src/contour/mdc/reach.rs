@@ -21,7 +21,7 @@ use crate::contour::mdc::cell::number_at;
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::leaf_vertex::Around;
 use crate::contour::mdc::vertices::Workspace;
-use crate::geom::qef::{Hit, solve};
+use crate::geom::qef::{Hit, meet};
 use crate::octree::{LINES, SIDE, VertexReach};
 
 /// How far from a feature its planes may pass, in cells.
@@ -236,7 +236,6 @@ impl<'w> Meeting<'w> {
         }
         let mut options = self.space.qef;
         (options.lo, options.hi) = (DVec3::splat(-2.0), DVec3::splat(2.0));
-        let met = solve(&hits[..self.apart], &options);
-        (!met.clamped && usize::from(met.rank) == self.apart).then_some(met.position)
+        meet(&hits[..self.apart], &options)
     }
 }

@@ -61,6 +61,28 @@ pub fn begin(hits: &[Hit], options: &QefOptions) -> Attempt {
     Attempt::Waiting(Waiting { qef, exact: bundle.exact, has_normals: bundle.normals > 0 })
 }
 
+/// Where up to three planes meet, one hit of each: the point of theirs nearest to the middle of the hits, if
+/// it is in the box, and if their normals differ enough for [`solve`] to say so. Sooner than that.
+#[inline]
+#[must_use]
+pub fn meet(planes: &[Hit], options: &QefOptions) -> Option<DVec3> {
+    let bundle = Bundle::gather(planes);
+    if usize::from(bundle.normals) != planes.len() {
+        return None;
+    }
+    match bundle.closed_form(options) {
+        Some((free, _)) => {
+            Some(bundle.with_exact_coordinates(free)).filter(|at| contains(options, *at))
+        }
+        // Near the cut the eigenvalues decide.
+        None if planes.len() == 3 => {
+            let met = solve(planes, options);
+            (!met.clamped && met.rank == 3).then_some(met.position)
+        }
+        None => None,
+    }
+}
+
 /// Places the vertex of a cell whose hits all have one normal: the same as [`begin`], sooner.
 #[inline]
 #[must_use]

@@ -348,3 +348,24 @@ fn smooth_cells_are_solved_as_by_eigenvalues() {
     }
     assert!(solved > 1000, "{solved}");
 }
+
+#[test]
+fn planes_meet_where_their_quadric_is_least_or_not_in_the_box() {
+    let mut dice = Dice(11);
+    let options = QefOptions::default();
+    let mut met = [0; 3];
+    for _ in 0..20_000 {
+        let count = 1 + (dice.roll() * 3.0) as usize;
+        let planes: Vec<Hit> = (0..count)
+            .map(|_| Hit { point: dice.vector(), normal: dice.vector().normalize_or(DVec3::X) })
+            .collect();
+        let expected = solve(&planes, &options);
+        let found = meet(&planes, &options);
+        assert_eq!(found.is_some(), !expected.clamped && usize::from(expected.rank) == count);
+        if let Some(found) = found {
+            assert!((found - expected.position).length() < 1e-6, "{found:?} {expected:?}");
+            met[count - 1] += 1;
+        }
+    }
+    assert!(met.iter().all(|count| *count > 500), "{met:?}");
+}

@@ -425,15 +425,13 @@ impl DiskModel<'_> {
             + spilled(added, ORDER_BYTES / BIN_SORT_BYTES, share / 4.0)
     }
 
-    /// What the comparison and the reader of the written file spill: both surfaces on tape, where no
-    /// triangle lies beside the one before it, and one of them while its tree is made.
+    /// What the comparison and the reader of the written file spill: the output on tape, boxes around its
+    /// triangles and those of the soup, of which none lies beside the one before it, and what makes
+    /// these boxes.
     fn measuring(&self, triangles: f64) -> f64 {
         let share = self.plan.share_bytes as f64 / 4.0 * 3.0;
         let most = &self.counts.at_most;
-        let tree = |count: f64| {
-            spilled(MEASURED_BYTES * count, 0.0, share / 8.0)
-                + spilled(BOX_BYTES * count, 0.0, share / 16.0)
-        };
+        let boxes = |count: f64| spilled(BOX_BYTES * count, 0.0, share / 16.0);
         let order = ORDER_BYTES / MEASURED_SORT_BYTES;
         let sorted = |count: f64| {
             spilled(RUN_BYTES * count, 0.0, share / 16.0)
@@ -450,7 +448,8 @@ impl DiskModel<'_> {
         let edges = spilled(MEASURED_EDGES_BYTES * larger, 0.0, share / 32.0)
             + spilled(MEASURED_PAIRS_BYTES * larger, 0.0, share / 32.0);
         let creases = creases(triangles) + creases(written) + edges;
-        tree(triangles) + tree(written) + sorted(larger) + positions + samples + creases
+        let tape = spilled(MEASURED_BYTES * written, 0.0, share / 8.0);
+        tape + boxes(triangles) + boxes(written) + sorted(larger) + positions + samples + creases
     }
 
     /// What the proof and the reader of the written file spill.

@@ -1,8 +1,7 @@
-//! Writes a brick file through mapped windows, or into memory.
+//! Writes a brick file, in windows that can be mapped to read it, or into memory.
 
 use std::sync::Arc;
 
-use memmap2::MmapMut;
 use rkyv::util::AlignedVec;
 
 use crate::store::brick::file::{BrickFile, Bytes};
@@ -10,7 +9,6 @@ use crate::store::brick::layout::{
     ALIGN_BYTES, DIRECTORY_MAGIC, DirectoryEntry, ENTRY_BYTES, HEADER_BYTES, MAGIC, WINDOW_BYTES,
     check_header, directory_name, header, read_directory,
 };
-use crate::store::mapped::map_new;
 use crate::store::{Backing, Digester, FileState, Scratch, ScratchFile, StoreError, part_digest};
 
 /// Writes a brick file, record by record.
@@ -22,15 +20,15 @@ pub struct BrickWriter {
 }
 
 enum Target {
-    Mapped(Box<MappedTarget>),
+    Disk(Box<DiskTarget>),
     Memory(Vec<Arc<AlignedVec>>),
 }
 
 /// A brick file on disk that grows.
-struct MappedTarget {
+struct DiskTarget {
     file: ScratchFile,
-    window: Option<MmapMut>,
-    window_start: u64,
+    /// How far room is reserved.
+    reserved: u64,
     end: u64,
     directory_file: ScratchFile,
     /// Entries that are in the file of the directory, and their digest.
@@ -38,16 +36,16 @@ struct MappedTarget {
     digester: Digester,
 }
 
-impl MappedTarget {
+impl DiskTarget {
     fn create(scratch: &Scratch, name: &str) -> Result<Self, StoreError> {
         let file = scratch.create(name)?;
-        let mut window = map_new(&file, 0, WINDOW_BYTES as usize)?;
-        window[..HEADER_BYTES as usize].copy_from_slice(&header(MAGIC, WINDOW_BYTES as u32));
+        file.reserve(0, WINDOW_BYTES)?;
+        file.write_at(&header(MAGIC, WINDOW_BYTES as u32), 0)?;
         let directory_file = scratch.create(&directory_name(name))?;
         directory_file.write_at(&header(DIRECTORY_MAGIC, ENTRY_BYTES as u32), 0)?;
-        let (window, end) = (Some(window), HEADER_BYTES);
         let (saved, digester) = (0, Digester::default());
-        Ok(Self { file, window, window_start: 0, end, directory_file, saved, digester })
+        let (reserved, end) = (WINDOW_BYTES, HEADER_BYTES);
+        Ok(Self { file, reserved, end, directory_file, saved, digester })
     }
 
     /// Goes on behind the last record that counts.
@@ -58,14 +56,14 @@ impl MappedTarget {
     ) -> Result<Self, StoreError> {
         let file = scratch.open(&state.name)?;
         check_header(&file, MAGIC, WINDOW_BYTES as u32)?;
-        let window_start = state.len_bytes / WINDOW_BYTES * WINDOW_BYTES;
-        let at_border = window_start == state.len_bytes;
-        let window = (!at_border).then(|| map_new(&file, window_start, WINDOW_BYTES as usize));
+        let reserved = state.len_bytes.next_multiple_of(WINDOW_BYTES);
+        if reserved > state.len_bytes {
+            file.reserve(reserved - WINDOW_BYTES, WINDOW_BYTES)?;
+        }
         let mut digester = Digester::default();
         digester.update(bytemuck::cast_slice(directory));
         Ok(Self {
-            window: window.transpose()?,
-            window_start,
+            reserved,
             end: state.len_bytes,
             directory_file: scratch.open(&directory_name(&state.name))?,
             saved: directory.len(),
@@ -78,19 +76,15 @@ impl MappedTarget {
     fn append(&mut self, bytes: &[u8]) -> Result<u64, StoreError> {
         let mut offset = self.end.next_multiple_of(ALIGN_BYTES);
         let len = bytes.len() as u64;
-        let capacity = self.window.as_ref().map_or(0, |window| window.len() as u64);
-        if offset + len > self.window_start + capacity {
+        if offset + len > self.reserved {
+            // A record lies in one window, or begins one.
             offset = self.end.next_multiple_of(WINDOW_BYTES);
             let span = len.max(1).next_multiple_of(WINDOW_BYTES);
-            self.window = None;
-            self.window = Some(map_new(&self.file, offset, span as usize)?);
-            self.window_start = offset;
+            self.file.reserve(offset, span)?;
+            self.reserved = offset + span;
         }
-        let at = (offset - self.window_start) as usize;
-        let window = self.window.as_mut().expect("a window covers the record");
-        window[at..at + bytes.len()].copy_from_slice(bytes);
+        self.file.write_at(bytes, offset)?;
         self.end = offset + len;
-        self.file.scratch().count_written(len);
         Ok(offset)
     }
 
@@ -118,7 +112,7 @@ impl BrickWriter {
     pub fn create(scratch: &Scratch, name: &str, backing: Backing) -> Result<Self, StoreError> {
         let target = match backing {
             Backing::Memory => Target::Memory(Vec::new()),
-            Backing::Mapped => Target::Mapped(Box::new(MappedTarget::create(scratch, name)?)),
+            Backing::Mapped => Target::Disk(Box::new(DiskTarget::create(scratch, name)?)),
         };
         let (scratch, name) = (scratch.clone(), name.to_owned());
         Ok(Self { scratch, name, directory: Vec::new(), target })
@@ -131,9 +125,9 @@ impl BrickWriter {
     /// The file or its directory is missing, or not what `state` says.
     pub fn reopen(scratch: &Scratch, state: &FileState) -> Result<Self, StoreError> {
         let directory = read_directory(scratch, state)?;
-        let target = MappedTarget::reopen(scratch, state, &directory)?;
+        let target = DiskTarget::reopen(scratch, state, &directory)?;
         let (scratch, name) = (scratch.clone(), state.name.clone());
-        Ok(Self { scratch, name, directory, target: Target::Mapped(Box::new(target)) })
+        Ok(Self { scratch, name, directory, target: Target::Disk(Box::new(target)) })
     }
 
     /// Appends the record of `key`, which is above all earlier keys.
@@ -154,7 +148,7 @@ impl BrickWriter {
                 records.push(Arc::new(record));
                 records.len() as u64 - 1
             }
-            Target::Mapped(target) => target.append(bytes)?,
+            Target::Disk(target) => target.append(bytes)?,
         };
         let hash = part_digest(bytes);
         self.directory.push(DirectoryEntry { key, offset, len_bytes, flags, hash });
@@ -166,7 +160,7 @@ impl BrickWriter {
     pub fn end_bytes(&self) -> u64 {
         match &self.target {
             Target::Memory(_) => 0,
-            Target::Mapped(target) => target.end,
+            Target::Disk(target) => target.end,
         }
     }
 
@@ -177,7 +171,7 @@ impl BrickWriter {
     pub fn save(&mut self) -> Result<Option<FileState>, StoreError> {
         match &mut self.target {
             Target::Memory(_) => Ok(None),
-            Target::Mapped(target) => target.save(&self.name, &self.directory).map(Some),
+            Target::Disk(target) => target.save(&self.name, &self.directory).map(Some),
         }
     }
 
@@ -189,7 +183,7 @@ impl BrickWriter {
         let state = self.save()?;
         let bytes = match self.target {
             Target::Memory(records) => Bytes::Memory(records),
-            Target::Mapped(target) => Bytes::mapped(target.file, cached_windows),
+            Target::Disk(target) => Bytes::mapped(target.file, cached_windows),
         };
         Ok(BrickFile::new(self.scratch, state, self.directory, bytes))
     }
