@@ -3,7 +3,7 @@
 //! Memory:     some 40 bytes a cell and 28 a component.
 
 use crate::contour::ContourError;
-use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of, place_of};
+use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of, number_at};
 use crate::contour::mdc::cut_cell::CutCell;
 use crate::mesh::Surface;
 use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
@@ -120,6 +120,13 @@ impl<'r> CutWalk<'r> {
         (cut, self.vertex - components, false)
     }
 
+    /// Whether a leaf cell lies in the cluster under way, which has one vertex: then there is nothing to
+    /// step over.
+    #[inline]
+    fn is_in_one_vertex(&self, number: usize) -> bool {
+        number < self.end && self.count == 1
+    }
+
     /// Which vertex of its cluster the next component has.
     fn member(&mut self) -> Option<u32> {
         if self.count == 1 {
@@ -155,13 +162,18 @@ impl Loaded {
         let mut loaded = Self::with_room(if is_whole { record.cells.len() } else { 0 });
         let mut walk = CutWalk::new(record);
         let mut offset = 0;
+        let (side_bits, side) = side_of(steps);
         for cell in record.cells.iter() {
             let cell = cell.to_native();
-            let count = u32::from(components_of(cell).count);
             let own_edges = usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
             let number = cell_number(cell);
+            let is_wanted = number & side_bits == side;
+            if !is_wanted && walk.is_in_one_vertex(number) {
+                offset += own_edges;
+                continue;
+            }
+            let count = u32::from(components_of(cell).count);
             let (cut, first, is_cluster) = walk.step(number, count);
-            let is_wanted = is_whole || touches(number, steps);
             if is_wanted {
                 loaded.cells.push(cell);
                 loaded.firsts.push(loaded.vertices.len() as u32);
@@ -256,12 +268,11 @@ pub fn far_point_key(axis: usize, is_upper: bool) -> u64 {
     (axis as u64) << 62 | 1 << 60 | u64::from(is_upper) << 59
 }
 
-/// Whether a cell of a brick so many steps away touches the brick at no steps.
-fn touches(number: usize, steps: [i32; 3]) -> bool {
-    let at = place_of(number);
-    (0..3).all(|a| match steps[a] {
-        -1 => at[a] == SIDE - 1,
-        1 => at[a] == 0,
-        _ => true,
-    })
+/// Bits of the number of a cell of a brick so many steps away, and what they are where the cell touches the
+/// brick at no steps.
+fn side_of(steps: [i32; 3]) -> (usize, usize) {
+    let along = |wanted: fn(i32) -> bool| {
+        number_at(steps.map(|step| if wanted(step) { SIDE - 1 } else { 0 }))
+    };
+    (along(|step| step != 0), along(|step| step < 0))
 }

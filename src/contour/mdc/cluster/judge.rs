@@ -39,7 +39,7 @@ impl Clustering {
         let is_simple = pieces.iter().all(Node::is_simple)
             && pieces.len() <= usize::from(u8::MAX)
             && !self.corners.are_cut_by(cell)
-            && !self.shares_ambiguous_face(cut, cell);
+            && !(self.has_ambiguous_faces && self.shares_ambiguous_face(cut, cell));
         if !is_simple {
             self.refusals.by_shape += 1;
             return true;

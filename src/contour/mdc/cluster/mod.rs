@@ -29,11 +29,14 @@ use glam::DVec3;
 pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
 pub use summary::{Part, join};
 
-use crate::contour::mdc::cell::{cell_number, components_of, number_at, place_of, segments_on};
+use crate::contour::mdc::cell::{
+    cell_mask, cell_number, components_of, number_at, place_of, segments_on,
+};
 use crate::contour::mdc::cluster::corners::Corners;
 use crate::contour::mdc::cluster::cut::Cut;
 use crate::contour::mdc::cluster::node::Node;
 use crate::contour::mdc::cluster::planes::{Group, add_group, add_hit};
+use crate::contour::mdc::table::AMBIGUOUS_FACES;
 use crate::geom::qef::QefOptions;
 use crate::octree::{CellBrick, MAX_LEVEL, SIDE};
 
@@ -90,6 +93,8 @@ pub struct Clustering {
     node_of: Vec<u32>,
     joined: Vec<u32>,
     corners: Corners,
+    /// Whether any cell of the brick has one.
+    has_ambiguous_faces: bool,
     merged: Vec<Node>,
     merged_groups: Vec<Group>,
     /// Refusals so far in the brick.
@@ -128,6 +133,7 @@ impl Clustering {
             node_of: Vec::new(),
             joined: Vec::new(),
             corners: Corners::default(),
+            has_ambiguous_faces: false,
             merged: Vec::new(),
             merged_groups: Vec::new(),
             refusals: Refusals::default(),
@@ -143,8 +149,10 @@ impl Clustering {
         self.node_of.clear();
         self.node_of.resize(brick.positions.len(), 0);
         self.corners.reset(&brick.reaches);
+        self.has_ambiguous_faces = false;
         for (rank, &cell) in brick.cells.iter().enumerate() {
             self.ranks[cell_number(cell)] = rank as u16;
+            self.has_ambiguous_faces |= AMBIGUOUS_FACES[usize::from(cell_mask(cell))] != 0;
         }
         let positions = std::mem::take(&mut brick.positions);
         let mut cut = Cut { brick, leaves, positions, placed: Vec::new() };

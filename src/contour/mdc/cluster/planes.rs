@@ -18,6 +18,9 @@ pub const MAX_GROUPS: usize = 8;
 /// In [`PlaneHit::plane`]: this plane judges the vertex and does not place it.
 pub const JUDGES_ONLY: u32 = 1 << 31;
 
+/// Distances that are measured before they are held against the threshold.
+const JUDGED_TOGETHER: usize = 16;
+
 /// A group of several planes.
 const MIXED: u32 = u32::MAX;
 
@@ -75,6 +78,20 @@ impl Group {
         true
     }
 
+    /// The normal of a plane as it is added to this group, if it surely belongs there: the group is of this
+    /// plane, or of several that point the same way.
+    #[inline]
+    fn turned(&self, plane: u32, normal: DVec3, cosine_squared: f64) -> Option<DVec3> {
+        if self.plane == plane {
+            return Some(normal);
+        }
+        let dot = self.normals.dot(normal);
+        let is_alike = self.plane == MIXED
+            && dot * dot
+                >= cosine_squared * self.normals.length_squared() * normal.length_squared();
+        is_alike.then_some(if dot < 0.0 { -normal } else { normal })
+    }
+
     /// Whether both are of one plane: by its number, or as two triangles of one face have it.
     fn is_same_plane(&self, other: &Self, planes: &[CellPlane]) -> bool {
         if self.plane == MIXED || other.plane == MIXED {
@@ -114,11 +131,14 @@ pub fn add_hit(
     cosine_squared: f64,
 ) -> bool {
     // Most cells have one group.
-    if let Some(known) = groups.get_mut(from).filter(|known| known.plane == hit.plane) {
-        known.normals += planes[hit.plane as usize].normal;
-        known.points += DVec3::from(hit.point.map(f64::from));
-        known.count += 1.0;
-        return true;
+    if let Some(known) = groups.get_mut(from) {
+        let normal = planes[hit.plane as usize].normal;
+        if let Some(normal) = known.turned(hit.plane, normal, cosine_squared) {
+            known.normals += normal;
+            known.points += DVec3::from(hit.point.map(f64::from));
+            known.count += 1.0;
+            return true;
+        }
     }
     add_group(groups, from, &Group::of(hit, planes), planes, cosine_squared)
 }
@@ -165,15 +185,14 @@ pub fn largest_distance(
     vertex: DVec3,
     threshold: f64,
 ) -> Option<f64> {
-    let (mut largest, mut last) = (0.0_f64, u32::MAX);
-    for hit in hits {
-        // Neighbours often are on one plane.
-        if hit.plane == last {
-            continue;
+    let mut largest = 0.0;
+    for some in hits.chunks(JUDGED_TOGETHER) {
+        for hit in some {
+            let plane = &planes[(hit.plane & !JUDGES_ONLY) as usize];
+            let distance = (plane.normal.dot(vertex) - plane.offset).abs();
+            // Not a number is no distance; the method for that takes longer.
+            largest = if distance > largest { distance } else { largest };
         }
-        last = hit.plane;
-        let plane = &planes[(hit.plane & !JUDGES_ONLY) as usize];
-        largest = largest.max((plane.normal.dot(vertex) - plane.offset).abs());
         if largest > threshold {
             return None;
         }
