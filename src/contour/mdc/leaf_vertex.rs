@@ -10,7 +10,7 @@ use crate::contour::mdc::INSET_UNITS;
 use crate::contour::mdc::borders::BorderPlanes;
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::table::{axis_of_edge, corner_of_edge};
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::vertices::{EdgeCrossing, Workspace};
 use crate::contour::{ContourError, ContourStats};
 use crate::geom::qef::{
     Attempt, Hit, QefOptions, Solution, Waiting, begin, solve, solve_flat, solve_smooth,
@@ -50,6 +50,12 @@ pub(super) struct Around {
 impl Around {
     fn points(&self) -> &[DVec3] {
         &self.points[..self.count]
+    }
+
+    /// Numbers of the normals.
+    #[inline]
+    pub(super) fn own_normals(&self) -> &[u32] {
+        &self.normals[..self.count]
     }
 
     /// The mean of the crossings.
@@ -226,6 +232,23 @@ impl Workspace {
     pub(super) fn around(&self, at: [usize; 3], edges: u16) -> Around {
         let mut around =
             Around { count: 0, points: [DVec3::ZERO; 12], normals: [0; 12], surfaces: [0; 12] };
+        self.each_crossing(at, edges, |point, crossing| {
+            around.points[around.count] = point;
+            around.normals[around.count] = crossing.normal;
+            around.surfaces[around.count] = crossing.surface;
+            around.count += 1;
+        });
+        around
+    }
+
+    /// Shows the crossings on these edges of a cell, with their places about its centre, in cells.
+    #[inline]
+    pub(super) fn each_crossing(
+        &self,
+        at: [usize; 3],
+        edges: u16,
+        mut visit: impl FnMut(DVec3, EdgeCrossing),
+    ) {
         let mut left = edges;
         while left != 0 {
             let edge = left.trailing_zeros() as u8;
@@ -236,12 +259,8 @@ impl Workspace {
             let crossing = self.crossing(axis, [0, 1, 2].map(|a| at[a] + corner[a]));
             let mut point = DVec3::from(corner.map(|c| c as f64 - 0.5));
             point[axis] = crossing.offset - 0.5;
-            around.points[around.count] = point;
-            around.normals[around.count] = crossing.normal;
-            around.surfaces[around.count] = crossing.surface;
-            around.count += 1;
+            visit(point, crossing);
         }
-        around
     }
 
     /// Where several components share a cell, each stays in the box of its own crossings: there

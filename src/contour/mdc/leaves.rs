@@ -5,7 +5,7 @@
 use glam::DVec3;
 
 use crate::contour::mdc::borders::BorderPlanes;
-use crate::contour::mdc::cluster::{CellPlane, JUDGES_ONLY, PlaneHit};
+use crate::contour::mdc::cluster::{CellPlane, JUDGES_ONLY, Leaves, PlaneHit};
 use crate::contour::mdc::leaf_vertex::Around;
 use crate::contour::mdc::vertices::Workspace;
 
@@ -41,6 +41,28 @@ impl Workspace {
         }
     }
 
+    /// Adds the only component of a cell, which no border passes, to the leaves, before its vertex is
+    /// placed; the numbers of its normals.
+    #[inline]
+    pub(super) fn add_borderless_leaf(
+        &mut self,
+        at: [usize; 3],
+        mask: u8,
+        edges: u16,
+    ) -> OwnNormals {
+        let low = DVec3::from(at.map(|c| c as f64)) + 0.5;
+        let mut own = OwnNormals { numbers: [0; 12], count: 0 };
+        let mut leaves = std::mem::take(&mut self.leaves);
+        leaves.hit_starts.push(leaves.hits.len() as u32);
+        self.each_crossing(at, edges, |point, crossing| {
+            leaves.add_hit(mask, point + low, crossing.normal);
+            own.numbers[own.count] = crossing.normal;
+            own.count += 1;
+        });
+        self.leaves = leaves;
+        own
+    }
+
     /// Adds a component of a cell to the leaves, before its vertex is placed.
     pub(super) fn add_leaf(
         &mut self,
@@ -52,17 +74,7 @@ impl Workspace {
         let low = DVec3::from(at.map(|c| c as f64)) + 0.5;
         self.leaves.hit_starts.push(self.leaves.hits.len() as u32);
         for i in 0..around.count {
-            let point = around.points[i] + low;
-            let plane = match around.normals[i] {
-                0 => {
-                    // A patch has no plane: the signs around tell how the surface faces.
-                    let normal = gradient(mask);
-                    self.leaves.planes.push(CellPlane { normal, offset: normal.dot(point) });
-                    (self.leaves.planes.len() - 1) as u32 | JUDGES_ONLY
-                }
-                normal => normal - 1,
-            };
-            self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
+            self.leaves.add_hit(mask, around.points[i] + low, around.normals[i]);
         }
         for border in border.planes() {
             let point = border.point + low;
@@ -71,6 +83,37 @@ impl Workspace {
             let plane = (self.leaves.planes.len() - 1) as u32;
             self.leaves.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
         }
+    }
+}
+
+impl Leaves {
+    /// Adds a crossing to the last component, on the plane that has this normal.
+    #[inline]
+    fn add_hit(&mut self, mask: u8, point: DVec3, normal: u32) {
+        let plane = match normal {
+            0 => {
+                // A patch has no plane: the signs around tell how the surface faces.
+                let normal = gradient(mask);
+                self.planes.push(CellPlane { normal, offset: normal.dot(point) });
+                (self.planes.len() - 1) as u32 | JUDGES_ONLY
+            }
+            normal => normal - 1,
+        };
+        self.hits.push(PlaneHit { plane, point: point.as_vec3().to_array() });
+    }
+}
+
+/// Numbers of the normals on the edges of a cell.
+pub(super) struct OwnNormals {
+    numbers: [u32; 12],
+    count: usize,
+}
+
+impl OwnNormals {
+    /// All of them.
+    #[inline]
+    pub(super) fn all(&self) -> &[u32] {
+        &self.numbers[..self.count]
     }
 }
 

@@ -11,7 +11,6 @@
 
 use crate::contour::mdc::cell::{cell_number, components_of, place_of};
 use crate::contour::mdc::features::Place;
-use crate::contour::mdc::leaf_vertex::Around;
 use crate::contour::mdc::vertices::Workspace;
 use crate::contour::{ContourError, ContourStats};
 use crate::geom::qef::Attempt;
@@ -26,8 +25,8 @@ pub(super) fn later(rank: usize) -> [i32; 3] {
 }
 
 impl Workspace {
-    /// Whether the vertex of a component is plain: no plane on its edges, nor on those that leave its
-    /// cell, differs from the first one by more than the crease angle.
+    /// Whether the vertex of a component with these normals is plain: no plane on its edges, nor on those
+    /// that leave its cell, differs from the first one by more than the crease angle.
     ///
     /// # Errors
     /// [`ContourError`].
@@ -36,13 +35,12 @@ impl Workspace {
         &mut self,
         place: Place,
         at: [usize; 3],
-        around: &Around,
+        own: &[u32],
     ) -> Result<bool, ContourError> {
         let is_inner = at.iter().all(|c| (1..SIDE - 1).contains(c));
         if self.is_smooth && is_inner {
             return Ok(true);
         }
-        let own = &around.normals[..around.count];
         // A patch has no plane.
         if own.contains(&0) {
             return Ok(false);

@@ -348,19 +348,28 @@ impl Workspace {
         }
         if self.method == Method::Dmc {
             self.place_in_middle(at, masks, brick);
+        } else if components.count == 1 && is_clustering && self.surfaces == SurfaceDetail::None {
+            let place = Place { signs, key };
+            let own = self.add_borderless_leaf(at, mask, masks[0]);
+            if self.is_plain(place, at, own.all())? {
+                brick.positions.push(later(brick.cells.len()));
+            } else {
+                let around = self.around(at, masks[0]);
+                self.place_alone(place, at, &around, brick, stats)?;
+            }
         } else if components.count == 1 {
-            let around = self.around(at, components.edge_masks[0]);
+            let place = Place { signs, key };
+            let around = self.around(at, masks[0]);
             let border = self.border_planes(at, &around);
             if is_clustering {
                 self.add_leaf(at, mask, &around, &border);
             }
-            let place = Place { signs, key };
-            if border.is_none() && is_clustering && self.is_plain(place, at, &around)? {
-                brick.positions.push(later(brick.cells.len()));
-            } else if border.is_none() {
-                self.place_alone(place, at, &around, brick, stats)?;
-            } else {
+            if !border.is_none() {
                 self.place_on_border(at, &around, &border, brick, stats);
+            } else if is_clustering && self.is_plain(place, at, around.own_normals())? {
+                brick.positions.push(later(brick.cells.len()));
+            } else {
+                self.place_alone(place, at, &around, brick, stats)?;
             }
         } else {
             if is_clustering {
