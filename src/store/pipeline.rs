@@ -265,6 +265,29 @@ mod tests {
     }
 
     #[test]
+    fn of_a_batch_all_before_its_first_error_is_taken() {
+        for threads in [1, 2, 8] {
+            let (mut next, mut taken) = (0_u64, 0);
+            let result: Result<(), u64> = ordered_by_weight(
+                &pool(threads),
+                Scales { most_bytes: 1000, weigh: |_: &u64| 1 },
+                || {
+                    next += 1;
+                    Ok(Some(next))
+                },
+                || (),
+                |(), item| if item >= 500 { Err(item) } else { Ok(item) },
+                |item| {
+                    taken += 1;
+                    assert_eq!(item, taken);
+                    Ok(())
+                },
+            );
+            assert_eq!((result, taken), (Err(500), 499));
+        }
+    }
+
+    #[test]
     fn heavy_items_go_alone_and_light_ones_together() {
         for threads in [1, 2, 8] {
             let under_way = AtomicU64::new(0);

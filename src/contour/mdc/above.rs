@@ -17,7 +17,7 @@ use std::ops::Range;
 
 use crate::contour::mdc::cell::place_of;
 use crate::contour::mdc::cluster::{ClusterOptions, Part, join};
-use crate::contour::mdc::vertices::cluster_options;
+use crate::contour::mdc::workspace::cluster_options;
 use crate::contour::mdc::{HAS_REACHES, HAS_SUMMARY, VERTICES, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
 use crate::geom::morton;

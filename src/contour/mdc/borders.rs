@@ -14,7 +14,7 @@ use glam::DVec3;
 
 use crate::contour::SurfaceDetail;
 use crate::contour::mdc::leaf_vertex::Around;
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::workspace::Workspace;
 use crate::geom::qef::Hit;
 use crate::octree::{Border, SIDE};
 

@@ -16,7 +16,7 @@ use glam::DVec3;
 
 use crate::contour::ContourError;
 use crate::contour::mdc::leaf_vertex::Around;
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::workspace::Workspace;
 use crate::geom::qef::{Hit, Solution, meet};
 use crate::octree::{
     AXIS_EDGES, BrickKey, LINES, PATCH, SIDE, SourcePlane, decode_signs, edge_position,

@@ -18,7 +18,7 @@ use std::collections::HashMap;
 
 use crate::contour::ContourError;
 use crate::contour::mdc::table::{AMBIGUOUS_FACES, touches_twice};
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::workspace::Workspace;
 use crate::octree::{BrickKey, CornerBits, EdgeBits, SIDE, decode_signs, face_index};
 use crate::store::BrickFile;
 

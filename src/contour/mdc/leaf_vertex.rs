@@ -10,7 +10,7 @@ use crate::contour::mdc::INSET_UNITS;
 use crate::contour::mdc::borders::BorderPlanes;
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::table::{axis_of_edge, corner_of_edge};
-use crate::contour::mdc::vertices::{EdgeCrossing, Workspace};
+use crate::contour::mdc::workspace::{EdgeCrossing, Workspace};
 use crate::contour::{ContourError, ContourStats};
 use crate::geom::qef::{
     Attempt, Hit, QefOptions, Solution, Waiting, begin, solve, solve_flat, solve_smooth,

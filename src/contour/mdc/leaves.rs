@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::contour::mdc::borders::BorderPlanes;
 use crate::contour::mdc::cluster::{CellPlane, JUDGES_ONLY, Leaves, PlaneHit};
 use crate::contour::mdc::leaf_vertex::Around;
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::workspace::Workspace;
 
 impl Workspace {
     /// The planes of the brick in cells; no leaf yet.

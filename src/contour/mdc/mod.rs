@@ -37,6 +37,7 @@ mod separate;
 mod shape;
 mod triangulate;
 mod vertices;
+mod workspace;
 
 pub use layers::Layers;
 pub use polygons::{BrickTriangles, FAN_POINT, Polygons};

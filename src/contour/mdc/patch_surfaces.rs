@@ -4,7 +4,7 @@
 //! Invariant:  depends on the brick alone. Memory: 290 KiB.
 //! Source:     a flood from all known crossings at once, along the edges of the grid.
 
-use crate::contour::mdc::vertices::{EdgeCrossing, NO_SURFACE};
+use crate::contour::mdc::workspace::{EdgeCrossing, NO_SURFACE};
 use crate::mesh::Surface;
 use crate::octree::{LINES, NO_SOURCE, edge_position};
 

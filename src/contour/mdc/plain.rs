@@ -11,7 +11,7 @@
 
 use crate::contour::mdc::cell::{cell_number, components_of, place_of};
 use crate::contour::mdc::features::Place;
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::workspace::Workspace;
 use crate::contour::{ContourError, ContourStats};
 use crate::geom::qef::Attempt;
 use crate::octree::{CellBrick, LINES, SIDE};

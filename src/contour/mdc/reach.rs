@@ -20,7 +20,7 @@ use crate::contour::mdc::INSET_UNITS;
 use crate::contour::mdc::cell::number_at;
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::leaf_vertex::Around;
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::workspace::Workspace;
 use crate::geom::qef::{Hit, meet};
 use crate::octree::{LINES, SIDE, VertexReach};
 

@@ -23,7 +23,7 @@ use crate::contour::mdc::grants::grant;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::look::{Look, Looked, look_at};
 use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
-use crate::contour::mdc::vertices::Workspace;
+use crate::contour::mdc::workspace::Workspace;
 use crate::contour::mdc::{HAS_MULTI, HAS_REACHES, above, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
 use crate::octree::{BrickKey, Domain, encode};
