@@ -7,8 +7,8 @@ use crate::contour::ContourError;
 use crate::contour::mdc::arcs::{Arc, Edge, edges_of};
 use crate::contour::mdc::around_edge::Polygon;
 use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
-use crate::contour::mdc::cut_cell::CutBox;
-use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};
+use crate::contour::mdc::cut_cell::{CutBox, CutCell};
+use crate::contour::mdc::neighbourhood::{Neighbourhood, OWN, Patch};
 use crate::contour::mdc::shape::{Loop, LoopPoint, Shape};
 use crate::contour::mdc::triangulate::Quad;
 use crate::geom::triangle_triangle::Triangle;
@@ -70,9 +70,10 @@ impl AroundCell {
     /// [`ContourError::Contradiction`].
     pub fn gather(
         nb: &mut Neighbourhood,
-        cut: CutBox,
+        cut: CutCell,
         ranks: std::ops::Range<usize>,
     ) -> Result<Self, ContourError> {
+        let cut_box = CutBox::new(OWN, cut);
         let mut around = Self {
             vertices: Vec::new(),
             arcs: Vec::new(),
@@ -83,7 +84,7 @@ impl AroundCell {
         };
         let mut edges = Vec::new();
         for rank in ranks {
-            around.add_leaf(nb, cut, rank, &mut edges)?;
+            around.add_leaf(nb, cut_box, rank, &mut edges)?;
         }
         edges.sort_unstable();
         edges.dedup();
@@ -168,7 +169,7 @@ impl AroundCell {
     fn add_polygon(
         &mut self,
         nb: &mut Neighbourhood,
-        cut: CutBox,
+        cut: CutCell,
         polygon: &Polygon,
     ) -> Result<(), ContourError> {
         let Edge { axis, lower } = polygon.edge;
@@ -180,7 +181,7 @@ impl AroundCell {
         let patches = polygon.patches();
         self.is_near_flagged |= patches.iter().any(|patch| patch.vertex.cut.is_flagged());
         for (i, patch) in patches.iter().enumerate() {
-            if patch.cut_box() != cut {
+            if patch.slot != OWN || patch.vertex.cut != cut {
                 continue;
             }
             let before = patches[(i + patches.len() - 1) % patches.len()];

@@ -124,7 +124,7 @@ fn decide(
     look: Look,
 ) -> Result<Decision, ContourError> {
     let cut_box = CutBox::new(OWN, cut);
-    let around = AroundCell::gather(nb, cut_box, ranks)?;
+    let around = AroundCell::gather(nb, cut, ranks)?;
     if look == Look::Second && !around.is_near_flagged {
         // Nothing has changed where no vertex moved.
         return Ok(Decision::Sound);

@@ -24,7 +24,7 @@ use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::look::{Look, Looked, look_at};
 use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
 use crate::contour::mdc::workspace::Workspace;
-use crate::contour::mdc::{HAS_MULTI, HAS_REACHES, above, face_points, flags_of};
+use crate::contour::mdc::{HAS_FLAGGED, HAS_MULTI, HAS_REACHES, above, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
 use crate::octree::{BrickKey, Domain, encode};
 use crate::store::{BrickFile, BrickWriter, Resources, directory_name};
@@ -148,6 +148,18 @@ impl Separation<'_> {
 
     /// Looks at all bricks of `wanted` that have cells with several vertices.
     fn look(&self, state: &mut State, look: Look, wanted: &[bool]) -> Result<Found, ContourError> {
+        let mut wanted = wanted.to_vec();
+        if look == Look::Second {
+            // Vertices have moved in flagged cells only.
+            let layers = Layers::new(self.cells, state.anew.as_ref());
+            let is_flagged = |number: &usize| layers.flags(*number) & HAS_FLAGGED != 0;
+            let mut is_near = vec![false; wanted.len()];
+            self.add_near((0..layers.bricks()).filter(is_flagged), &mut is_near);
+            wanted.iter_mut().zip(is_near).for_each(|(wanted, is_near)| *wanted &= is_near);
+        }
+        if !wanted.contains(&true) {
+            return Ok(Found::default());
+        }
         self.pass(
             state,
             |layers, number| wanted[number] && layers.flags(number) & HAS_MULTI != 0,
