@@ -177,7 +177,8 @@ pub struct ContourStats {
     pub flipped_faces: u64,
     /// Vertices in cells; on edges by marching cubes.
     pub cell_vertices: u64,
-    /// Vertices that were pulled back into their cell.
+    /// Vertices that were pulled back into their cell, of those that were placed: in most cells that become
+    /// part of a cluster none is.
     pub clamped_vertices: u64,
     /// Vertices on creases or corners that their cells' own edges do not see.
     pub feature_vertices: u64,
