@@ -29,7 +29,11 @@ POLL_SECONDS = 0.002
 def sizes(folder):
     """Sizes of the files in a folder by name, as far as they stay there."""
     found = {}
-    for entry in folder.rglob("*"):
+    try:
+        entries = list(folder.rglob("*"))
+    except FileNotFoundError:  # removed while it was listed
+        return {}
+    for entry in entries:
         try:
             if entry.is_file():
                 found[entry.name] = entry.stat().st_size

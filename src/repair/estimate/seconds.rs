@@ -10,9 +10,9 @@ use crate::monitor::Stage;
 use crate::repair::estimate::counts::Counts;
 
 /// Nanoseconds of one core.
-const PER_INPUT_BYTE: f64 = 10.0;
-const PER_TRIANGLE: f64 = 300.0;
-const PER_PAIR: f64 = 600.0;
+const PER_INPUT_BYTE: f64 = 6.0;
+const PER_TRIANGLE: f64 = 200.0;
+const PER_PAIR: f64 = 400.0;
 const PER_PAIR_MENDED: f64 = 900.0;
 const PER_SCANNED_PAIR: f64 = 160.0;
 const PER_HIT: f64 = 70.0;
@@ -20,9 +20,9 @@ const PER_FLIP: f64 = 450.0;
 const PER_ODD_FACE: f64 = 600.0;
 const PER_CROSSING_SIGNED: f64 = 80.0;
 const PER_BRICK: f64 = 60_000.0;
-const PER_CROSSING_PLACED: f64 = 1400.0;
-const PER_TRIANGLE_PROVED: f64 = 600.0;
-const PER_TRIANGLE_MEASURED: f64 = 500.0;
+const PER_CROSSING_PLACED: f64 = 1100.0;
+const PER_TRIANGLE_PROVED: f64 = 250.0;
+const PER_TRIANGLE_MEASURED: f64 = 300.0;
 /// Share of a stage that more threads make shorter.
 const PARALLEL: [(Stage, f64); 8] = [
     (Stage::Ingest, 0.5),
