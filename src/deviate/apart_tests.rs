@@ -89,7 +89,7 @@ fn every_point_is_in_a_piece_if_and_only_if_it_is_far() {
 }
 
 #[test]
-fn threads_shares_and_the_order_of_the_tree_change_nothing() {
+fn threads_and_shares_change_nothing() {
     let mut random = Random::new(3);
     // Some are so large that several workers have pieces of them.
     let mut one = soup(&mut random, 600, 0.05);

@@ -13,9 +13,7 @@ use crate::ingest::packed::{
     EdgeUse, KeySet, Member, NO_GROUP, NO_WIDTH, Triple, given_edge, given_triangle, mix,
     pack_corners, turn_of,
 };
-use crate::octree::points::{
-    Point, is_degenerate, length_of, owner, pack_ends, snapped, unpack_ends,
-};
+use crate::octree::points::{Point, is_degenerate, length_of, pack_ends, snapped, unpack_ends};
 use crate::octree::{BinEntry, BrickKey, Domain, SoupTriangle};
 use crate::store::{Outbox, Scratch, Sorter, StoreError};
 
@@ -56,7 +54,7 @@ fn edges_of([p, q, r]: [Point; 3]) -> impl Iterator<Item = [Point; 2]> {
 }
 
 /// Tells whether any of the edges that were added came an odd number of times: those that came twice
-/// cancel out in the sums of their hashes, of which there are two, so that nothing else does.
+/// cancel out in the sums of their hashes. There are two of 64 bits, so that chance does not cancel any.
 #[derive(Default)]
 struct Parity([u64; 2]);
 
@@ -163,13 +161,14 @@ impl Examiner<'_> {
         entry: BinEntry,
         stats: &mut SettleStats,
     ) -> Result<Sorter<Member>, StoreError> {
+        let owned = Owned::new(self.domain, entry.brick);
         let mut triples = Sorter::<Triple>::new(self.scratch, self.share_bytes);
         let mut reader = self.bins.triangles.reader(entry.first, entry.count);
         while let Some(block) = reader.next_block()? {
             for triangle in block {
                 let mut corners = snapped(self.domain, triangle);
                 corners.sort_unstable();
-                if owner(self.domain, corners[0]) == entry.brick && is_degenerate(corners) {
+                if owned.holds(corners[0]) && is_degenerate(corners) {
                     stats.degenerate_triangles += 1;
                 }
                 let given = given_triangle(&triangle.corners);
@@ -218,6 +217,7 @@ impl Examiner<'_> {
         entry: BinEntry,
         members: Sorter<Member>,
     ) -> Result<Sorter<EdgeUse>, StoreError> {
+        let owned = Owned::new(self.domain, entry.brick);
         let mut edges = Sorter::<EdgeUse>::new(self.scratch, self.share_bytes);
         let mut members = members.finish()?;
         let mut member = members.next()?;
@@ -232,7 +232,7 @@ impl Examiner<'_> {
                     group = listed.group;
                     member = members.next()?;
                 }
-                self.push_edges(entry.brick, triangle, group, &mut edges)?;
+                self.push_edges(&owned, triangle, group, &mut edges)?;
             }
         }
         Ok(edges)
@@ -240,7 +240,7 @@ impl Examiner<'_> {
 
     fn push_edges(
         &self,
-        brick: u64,
+        owned: &Owned,
         triangle: &SoupTriangle,
         group: u32,
         edges: &mut Sorter<EdgeUse>,
@@ -251,7 +251,7 @@ impl Examiner<'_> {
         for i in 0..3 {
             let (a, b) = (corners[i], corners[(i + 1) % 3]);
             let ends = [a.min(b), a.max(b)];
-            if a != b && owner(self.domain, ends[0]) == brick {
+            if a != b && owned.holds(ends[0]) {
                 let given = given_edge(triangle.corners[i], triangle.corners[(i + 1) % 3]);
                 let turn = turn_of(ends, corners[(i + 2) % 3]);
                 edges.push(EdgeUse { ends: pack_ends(ends), given, group, turn })?;
