@@ -1,14 +1,23 @@
 //! Second pass: every triangle into the bins of the bricks that it touches.
+//!
+//! In:         the soup.
+//! Out:        for each brick the triangles that touch it, by source number: as entries of the soup itself
+//!             where neighbours follow each other in the file, else as sorted copies.
+//! Invariant:  what a bin holds does not depend on which of the two it is.
+//! Memory:     the share.
+//! Fails:      only as [`StoreError`].
+
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use crate::ingest::area::{AreaHistogram, SoupMeasure};
 use crate::ingest::crowds::{CrowdFilter, LeftOut};
-use crate::ingest::soup::Soup;
+use crate::ingest::soup::{SOUP, Soup};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupTriangle,
     for_each_touched_brick, write_bins,
 };
-use crate::store::{FileState, Resources, Sorter, Spool, StoreError, ordered};
+use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
 
 /// Spool of the binned triangles, by brick and source number.
 pub const BINS: &str = "bins.spool";
@@ -17,14 +26,24 @@ pub const BIN_ENTRIES: &str = "bins.entries";
 /// Triangles per work item.
 const ITEM_TRIANGLES: usize = 2048;
 
+/// Entries are of the soup itself while they hold so many triangles on average; shorter ones would be read
+/// piecemeal.
+const FEWEST_IN_ENTRY: u64 = 6;
+/// Entries that there may be before that is asked.
+const FREE_ENTRIES: u64 = 4096;
+/// Entries under way that a triangle may continue.
+const OPEN_ENTRIES: usize = 16;
+
 /// The bins of all bricks.
 pub struct Bins {
-    /// The triangles.
+    /// The triangles: sorted copies, or the soup as it is where neighbours follow each other in the file.
     pub triangles: Spool<SoupTriangle>,
-    /// The bins by ascending brick key.
+    /// Where those of each brick lie, by ascending brick key.
     pub entries: Spool<BinEntry>,
     /// What is in no bin.
     pub left_out: LeftOut,
+    /// How the sorted copies are found again; none are there where the soup serves as it is.
+    copies: FileState,
 }
 
 impl Bins {
@@ -37,11 +56,22 @@ impl Bins {
         files: &[FileState],
         left_out: LeftOut,
     ) -> Result<Self, StoreError> {
-        Ok(Self {
-            triangles: Spool::open(resources.scratch, FileState::find(files, BINS)?)?,
-            entries: Spool::open(resources.scratch, FileState::find(files, BIN_ENTRIES)?)?,
-            left_out,
-        })
+        let copies = Spool::open(resources.scratch, FileState::find(files, BINS)?)?;
+        let entries = Spool::open(resources.scratch, FileState::find(files, BIN_ENTRIES)?)?;
+        Self::of(copies, entries, FileState::find(files, SOUP)?, left_out, resources)
+    }
+
+    fn of(
+        copies: Spool<SoupTriangle>,
+        entries: Spool<BinEntry>,
+        soup: &FileState,
+        left_out: LeftOut,
+        resources: &Resources,
+    ) -> Result<Self, StoreError> {
+        let state = copies.state().clone();
+        let triangles =
+            if copies.is_empty() { Spool::open(resources.scratch, soup)? } else { copies };
+        Ok(Self { triangles, entries, left_out, copies: state })
     }
 
     /// The soup without what `drops` leaves out.
@@ -59,15 +89,112 @@ impl Bins {
     /// The files, as they have to be found again.
     #[must_use]
     pub fn files(&self) -> Vec<FileState> {
-        vec![self.triangles.state().clone(), self.entries.state().clone()]
+        vec![self.copies.clone(), self.entries.state().clone()]
     }
 }
 
-/// Sorts the triangles of `soup` into bins. Of triangles that come in crowds, pairs are left out.
+/// Puts the triangles of `soup` into bins. Of triangles that come in crowds, pairs are left out.
 ///
 /// # Errors
 /// The scratch disk fails, or the caller cancels.
 pub fn fill_bins(
+    soup: &Soup,
+    domain: &Domain,
+    resources: &Resources,
+) -> Result<(Bins, SoupMeasure), StoreError> {
+    match list_entries(soup, domain, resources)? {
+        Some(listed) => Ok(listed),
+        None => sort_copies(soup, domain, resources),
+    }
+}
+
+/// Lists which triangles of the soup each brick has; `None` where it takes too many entries, or the soup does
+/// not serve as it is.
+fn list_entries(
+    soup: &Soup,
+    domain: &Domain,
+    resources: &Resources,
+) -> Result<Option<(Bins, SoupMeasure)>, StoreError> {
+    if !soup.looks.is_none() {
+        return Ok(None);
+    }
+    let mut histogram = AreaHistogram::new(soup.facts.bounds);
+    let mut filter = CrowdFilter::new(domain);
+    let mut sorter = Sorter::<BinEntry>::new(resources.scratch, resources.share_bytes);
+    let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
+    let mut next = 0;
+    let serves = AtomicBool::new(true);
+    let (mut listed, mut held) = (0, 0);
+    ordered(
+        resources.pool,
+        || {
+            if resources.monitor.cancelled() {
+                return Err(StoreError::Cancelled);
+            }
+            let first = next;
+            let mut triangles = Vec::new();
+            soup.spool.read(first, ITEM_TRIANGLES, &mut triangles)?;
+            next += triangles.len() as u64;
+            triangles.iter().for_each(|triangle| histogram.add(triangle));
+            let count = triangles.len();
+            if filter.thin_out(&mut triangles) {
+                serves.store(false, Ordering::Relaxed);
+            }
+            let goes_on = count > 0 && serves.load(Ordering::Relaxed);
+            let held = resident.hold(count);
+            Ok(goes_on.then_some((first, triangles, held)))
+        },
+        || (),
+        |(), (first, triangles, _held): (u64, Vec<SoupTriangle>, _)| {
+            entries_of(domain, first, &triangles)
+        },
+        |entries: Vec<BinEntry>| {
+            listed += entries.len() as u64;
+            held += entries.iter().map(|entry| entry.count).sum::<u64>();
+            if listed > FREE_ENTRIES + held / FEWEST_IN_ENTRY {
+                serves.store(false, Ordering::Relaxed);
+            }
+            sorter.extend(&entries)
+        },
+    )?;
+    if !serves.into_inner() {
+        return Ok(None);
+    }
+    let copies = SpoolWriter::create(resources.scratch, BINS)?.finish()?;
+    let mut spool = SpoolWriter::create(resources.scratch, BIN_ENTRIES)?;
+    let mut sorted = sorter.finish()?;
+    while let Some(entry) = sorted.next()? {
+        spool.push(entry)?;
+    }
+    let left_out = filter.left_out();
+    let bins = Bins::of(copies, spool.finish()?, soup.spool.state(), left_out, resources)?;
+    Ok(Some((bins, histogram.finish())))
+}
+
+/// The entries of triangles that lie in the soup from `first` on.
+fn entries_of(
+    domain: &Domain,
+    first: u64,
+    triangles: &[SoupTriangle],
+) -> Result<Vec<BinEntry>, StoreError> {
+    let mut entries: Vec<BinEntry> = Vec::new();
+    for (number, triangle) in (first..).zip(triangles) {
+        let corners = triangle.corners.map(|c| domain.snap(c));
+        for_each_touched_brick(domain, corners, &mut |key| {
+            let open = entries.len().saturating_sub(OPEN_ENTRIES);
+            let last = entries[open..].iter_mut().rev().find(|entry| entry.brick == key.0);
+            match last {
+                Some(entry) if entry.first + entry.count == number => entry.count += 1,
+                _ => entries.push(BinEntry { brick: key.0, first: number, count: 1 }),
+            }
+            Ok::<(), StoreError>(())
+        })?;
+    }
+    Ok(entries)
+}
+
+/// Sorts copies of the triangles of the soup into bins.
+fn sort_copies(
     soup: &Soup,
     domain: &Domain,
     resources: &Resources,
@@ -112,5 +239,6 @@ pub fn fill_bins(
         |(binned, _held)| sorter.extend(&binned),
     )?;
     let (triangles, entries) = write_bins(sorter, [BINS, BIN_ENTRIES], resources)?;
-    Ok((Bins { triangles, entries, left_out: filter.left_out() }, histogram.finish()))
+    let (soup, left_out) = (soup.spool.state(), filter.left_out());
+    Ok((Bins::of(triangles, entries, soup, left_out, resources)?, histogram.finish()))
 }

@@ -60,8 +60,10 @@ impl<'d> CrowdFilter<'d> {
         Self { domain, slots: vec![Slot::default(); SLOTS], left_out: LeftOut::default() }
     }
 
-    /// Takes triangles out of the list, and may put in some that were taken out before.
-    pub(crate) fn thin_out(&mut self, triangles: &mut Vec<SoupTriangle>) {
+    /// Takes triangles out of the list, and may put in some that were taken out before; whether it did
+    /// either.
+    pub(crate) fn thin_out(&mut self, triangles: &mut Vec<SoupTriangle>) -> bool {
+        let before = triangles.len();
         let mut overdue = Vec::new();
         triangles.retain(|triangle| {
             let corners = triangle.corners.map(given);
@@ -85,7 +87,9 @@ impl<'d> CrowdFilter<'d> {
             }
             false
         });
+        let is_changed = triangles.len() != before || !overdue.is_empty();
         triangles.append(&mut overdue);
+        is_changed
     }
 
     /// The triangles that still wait.

@@ -90,23 +90,21 @@ pub fn settle(
         degenerate_triangles: bins.left_out.degenerate_triangles,
         ..SettleStats::default()
     };
-    let mut next = 0;
-    let mut entries = Vec::new();
+    let spools = bins.spools();
+    let mut walk = spools.bins();
     ordered(
         resources.pool,
         || {
             if resources.monitor.cancelled() {
                 return Err(StoreError::Cancelled);
             }
-            bins.entries.read(next, 1, &mut entries)?;
-            next += 1;
-            Ok(entries.first().copied())
+            walk.next()
         },
         || {
             let (copies, facts) = (Outbox::new(&copies), Outbox::new(&facts));
             Examiner { bins, domain, scratch, share_bytes, copies, facts }
         },
-        |examiner, entry| examiner.examine(entry),
+        |examiner, bin| examiner.examine(&bin),
         |found: SettleStats| {
             stats.rim_edges += found.rim_edges;
             stats.rim_length += found.rim_length;

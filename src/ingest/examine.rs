@@ -14,7 +14,7 @@ use crate::ingest::packed::{
     pack_corners, turn_of,
 };
 use crate::octree::points::{Point, is_degenerate, length_of, pack_ends, snapped, unpack_ends};
-use crate::octree::{BinEntry, BrickKey, Domain, SoupTriangle};
+use crate::octree::{Bin, BrickKey, Domain, SoupTriangle};
 use crate::store::{Outbox, Scratch, Sorter, StoreError};
 
 /// Where a worker puts what it finds, and what it may use.
@@ -35,9 +35,9 @@ struct Owned {
 }
 
 impl Owned {
-    fn new(domain: &Domain, brick: u64) -> Self {
+    fn new(domain: &Domain, brick: BrickKey) -> Self {
         let side = domain.brick_units() as u32;
-        Self { low: BrickKey(brick).position().map(|c| c * side), side }
+        Self { low: brick.position().map(|c| c * side), side }
     }
 
     #[inline]
@@ -76,13 +76,22 @@ const SMALL_BIN: u64 = 1 << 15;
 
 impl Examiner<'_> {
     /// Finds the copies in the bin, and the open edges that it owns.
-    pub(crate) fn examine(&mut self, entry: BinEntry) -> Result<SettleStats, StoreError> {
-        if entry.count <= SMALL_BIN
-            && let Some(stats) = self.examine_small(entry)?
+    pub(crate) fn examine(&mut self, bin: &Bin) -> Result<SettleStats, StoreError> {
+        if bin.count <= SMALL_BIN
+            && let Some(stats) = self.examine_small(bin)?
         {
             return Ok(stats);
         }
-        self.examine_sorted(entry)
+        self.examine_sorted(bin)
+    }
+
+    /// Visits the triangles of a bin.
+    fn each(
+        &self,
+        bin: &Bin,
+        mut visit: impl FnMut(&SoupTriangle) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        self.bins.spools().each_block(bin, None, |block| block.iter().try_for_each(&mut visit))
     }
 
     /// Lattice units in model units.
@@ -91,27 +100,27 @@ impl Examiner<'_> {
     }
 
     /// The counts of a bin without copies; `None` when there may be copies.
-    fn examine_small(&self, entry: BinEntry) -> Result<Option<SettleStats>, StoreError> {
-        let owned = Owned::new(self.domain, entry.brick);
+    fn examine_small(&self, bin: &Bin) -> Result<Option<SettleStats>, StoreError> {
+        let owned = Owned::new(self.domain, bin.brick);
         let mut stats = SettleStats::default();
-        let mut seen = KeySet::with_capacity_and_hasher(entry.count as usize, Default::default());
+        let mut seen = KeySet::with_capacity_and_hasher(bin.count as usize, Default::default());
         let mut parity = Parity::default();
-        let mut reader = self.bins.triangles.reader(entry.first, entry.count);
-        while let Some(block) = reader.next_block()? {
-            for triangle in block {
-                let mut corners = snapped(self.domain, triangle);
-                corners.sort_unstable();
-                if owned.holds(corners[0]) && is_degenerate(corners) {
-                    stats.degenerate_triangles += 1;
-                }
-                if !seen.insert(mix(&pack_corners(corners))) {
-                    return Ok(None);
-                }
-                edges_of(corners).filter(|ends| owned.holds(ends[0])).for_each(|e| parity.add(e));
+        let mut has_copies = false;
+        self.each(bin, |triangle| {
+            let mut corners = snapped(self.domain, triangle);
+            corners.sort_unstable();
+            if owned.holds(corners[0]) && is_degenerate(corners) {
+                stats.degenerate_triangles += 1;
             }
+            has_copies |= !seen.insert(mix(&pack_corners(corners)));
+            edges_of(corners).filter(|ends| owned.holds(ends[0])).for_each(|e| parity.add(e));
+            Ok(())
+        })?;
+        if has_copies {
+            return Ok(None);
         }
         if parity.has_odd() {
-            self.find_rims(entry, &owned, &mut stats)?;
+            self.find_rims(bin, &owned, &mut stats)?;
         }
         Ok(Some(stats))
     }
@@ -120,24 +129,22 @@ impl Examiner<'_> {
     /// is odd.
     fn find_rims(
         &self,
-        entry: BinEntry,
+        bin: &Bin,
         owned: &Owned,
         stats: &mut SettleStats,
     ) -> Result<(), StoreError> {
         let mut odd: KeySet<[u64; 3]> = KeySet::default();
-        let mut reader = self.bins.triangles.reader(entry.first, entry.count);
-        while let Some(block) = reader.next_block()? {
-            for triangle in block {
-                let mut corners = snapped(self.domain, triangle);
-                corners.sort_unstable();
-                for ends in edges_of(corners).filter(|ends| owned.holds(ends[0])) {
-                    let key = pack_ends(ends);
-                    if !odd.remove(&key) {
-                        odd.insert(key);
-                    }
+        self.each(bin, |triangle| {
+            let mut corners = snapped(self.domain, triangle);
+            corners.sort_unstable();
+            for ends in edges_of(corners).filter(|ends| owned.holds(ends[0])) {
+                let key = pack_ends(ends);
+                if !odd.remove(&key) {
+                    odd.insert(key);
                 }
             }
-        }
+            Ok(())
+        })?;
         let mut odd: Vec<[u64; 3]> = odd.into_iter().collect();
         odd.sort_unstable();
         odd.iter().for_each(|&ends| stats.add_rim(length_of(unpack_ends(ends), self.unit())));
@@ -145,10 +152,10 @@ impl Examiner<'_> {
     }
 
     /// Examines a bin of any size, or one with copies.
-    fn examine_sorted(&mut self, entry: BinEntry) -> Result<SettleStats, StoreError> {
+    fn examine_sorted(&mut self, bin: &Bin) -> Result<SettleStats, StoreError> {
         let mut stats = SettleStats::default();
-        let members = self.find_copies(entry, &mut stats)?;
-        let edges = self.collect_edges(entry, members)?;
+        let members = self.find_copies(bin, &mut stats)?;
+        let edges = self.collect_edges(bin, members)?;
         judge_edges(edges, self.unit(), &mut self.facts, &mut stats)?;
         self.copies.send()?;
         self.facts.send()?;
@@ -158,24 +165,21 @@ impl Examiner<'_> {
     /// Tells of every member of every group of two or more, and lists them for the second look.
     fn find_copies(
         &mut self,
-        entry: BinEntry,
+        bin: &Bin,
         stats: &mut SettleStats,
     ) -> Result<Sorter<Member>, StoreError> {
-        let owned = Owned::new(self.domain, entry.brick);
+        let owned = Owned::new(self.domain, bin.brick);
         let mut triples = Sorter::<Triple>::new(self.scratch, self.share_bytes);
-        let mut reader = self.bins.triangles.reader(entry.first, entry.count);
-        while let Some(block) = reader.next_block()? {
-            for triangle in block {
-                let mut corners = snapped(self.domain, triangle);
-                corners.sort_unstable();
-                if owned.holds(corners[0]) && is_degenerate(corners) {
-                    stats.degenerate_triangles += 1;
-                }
-                let given = given_triangle(&triangle.corners);
-                let source = u64::from(triangle.source);
-                triples.push(Triple { corners: pack_corners(corners), given, source })?;
+        self.each(bin, |triangle| {
+            let mut corners = snapped(self.domain, triangle);
+            corners.sort_unstable();
+            if owned.holds(corners[0]) && is_degenerate(corners) {
+                stats.degenerate_triangles += 1;
             }
-        }
+            let given = given_triangle(&triangle.corners);
+            let source = u64::from(triangle.source);
+            triples.push(Triple { corners: pack_corners(corners), given, source })
+        })?;
         let mut members = Sorter::<Member>::new(self.scratch, self.share_bytes);
         let mut sorted = triples.finish()?;
         let mut first: Option<Triple> = None;
@@ -188,10 +192,10 @@ impl Examiner<'_> {
             };
             let group = known.source as u32;
             if !in_group {
-                self.add_copy(entry.brick, group, group, &mut members)?;
+                self.add_copy(bin.brick.0, group, group, &mut members)?;
                 in_group = true;
             }
-            self.add_copy(entry.brick, group, triple.source as u32, &mut members)?;
+            self.add_copy(bin.brick.0, group, triple.source as u32, &mut members)?;
             if !differs && triple.given != known.given {
                 self.facts.push(Fact { group, kind: DIFFERS, value: 0 })?;
                 differs = true;
@@ -214,27 +218,24 @@ impl Examiner<'_> {
     /// The uses of all edges that the bin owns.
     fn collect_edges(
         &self,
-        entry: BinEntry,
+        bin: &Bin,
         members: Sorter<Member>,
     ) -> Result<Sorter<EdgeUse>, StoreError> {
-        let owned = Owned::new(self.domain, entry.brick);
+        let owned = Owned::new(self.domain, bin.brick);
         let mut edges = Sorter::<EdgeUse>::new(self.scratch, self.share_bytes);
         let mut members = members.finish()?;
         let mut member = members.next()?;
-        let mut reader = self.bins.triangles.reader(entry.first, entry.count);
-        while let Some(block) = reader.next_block()? {
-            for triangle in block {
-                let mut group = NO_GROUP;
-                // Both ascend by source number.
-                if let Some(listed) = member
-                    && listed.source == triangle.source
-                {
-                    group = listed.group;
-                    member = members.next()?;
-                }
-                self.push_edges(&owned, triangle, group, &mut edges)?;
+        self.each(bin, |triangle| {
+            let mut group = NO_GROUP;
+            // Both ascend by source number.
+            if let Some(listed) = member
+                && listed.source == triangle.source
+            {
+                group = listed.group;
+                member = members.next()?;
             }
-        }
+            self.push_edges(&owned, triangle, group, &mut edges)
+        })?;
         Ok(edges)
     }
 

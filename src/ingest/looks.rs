@@ -44,6 +44,11 @@ pub struct Looks {
 }
 
 impl Looks {
+    /// Whether the materials of triangles stay.
+    pub(super) fn is_none(&self) -> bool {
+        self.of_triangles.is_empty()
+    }
+
     /// Gives triangles, which are those of the soup from `first` on, their looks in place of their
     /// materials; `looks` is room for them.
     pub(super) fn put_on(

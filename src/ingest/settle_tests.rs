@@ -43,11 +43,16 @@ fn settled(soup: &[Corners], depth: u32, share_bytes: u64, threads: usize) -> Sa
     let (bins, _) = fill_bins(&read, &domain, &resources).expect("room on the disk");
     let settled = settle(&bins, &domain, read.facts.stats.triangles, &resources).expect("room");
     let mut left: BTreeMap<u64, BTreeSet<u32>> = BTreeMap::new();
-    let (mut entries, mut triangles, mut drops) = (Vec::new(), Vec::new(), Vec::new());
-    bins.entries.read(0, usize::MAX >> 8, &mut entries).expect("readable");
-    for entry in entries {
-        bins.triangles.read(entry.first, entry.count as usize, &mut triangles).expect("readable");
-        left.insert(entry.brick, triangles.iter().map(|t| t.source).collect());
+    let mut drops = Vec::new();
+    let spools = bins.spools();
+    let mut walk = spools.bins();
+    while let Some(bin) = walk.next().expect("readable") {
+        let sources = left.entry(bin.brick.0).or_default();
+        let listed = spools.each_block(&bin, None, |block| {
+            sources.extend(block.iter().map(|t| t.source));
+            Ok(())
+        });
+        listed.expect("readable");
     }
     settled.drops.read(0, usize::MAX >> 8, &mut drops).expect("readable");
     for drop in &drops {

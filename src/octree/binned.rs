@@ -6,9 +6,14 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::Resident;
 use crate::octree::{BinTriangle, BrickKey, DropRecord, SoupTriangle};
-use crate::store::{Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError};
+use crate::store::{Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError};
 
-/// Where the triangles of a brick lie.
+/// Triangles between two entries that are rather read in vain than passed over.
+const MOST_BETWEEN: u64 = 64;
+/// Triangles that are read for several entries at one time.
+const MOST_IN_SPAN: u64 = 1024;
+
+/// Triangles of a brick that lie one after the other in a spool.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Pod, Zeroable)]
 #[repr(C)]
 pub struct BinEntry {
@@ -20,13 +25,149 @@ pub struct BinEntry {
     pub count: u64,
 }
 
-/// Triangles once per brick that they touch, by brick and source number.
+impl Record for BinEntry {
+    type Key = (u64, u64);
+    fn key(&self) -> Self::Key {
+        (self.brick, self.first)
+    }
+}
+
+/// For each brick the triangles that touch it, by source number.
 #[derive(Clone, Copy)]
 pub struct BinSpools<'b> {
-    /// The triangles.
+    /// The triangles, by source number within the entries of a brick.
     pub triangles: &'b Spool<SoupTriangle>,
-    /// The bins by ascending brick key.
+    /// Where they lie, by ascending brick key and first triangle.
     pub entries: &'b Spool<BinEntry>,
+}
+
+/// The triangles of one brick.
+#[derive(Clone, Debug)]
+pub struct Bin {
+    /// The brick.
+    pub brick: BrickKey,
+    /// How many triangles lie in it.
+    pub count: u64,
+    /// Numbers of its entries.
+    entries: Range<u64>,
+}
+
+/// The bins of [`BinSpools`] by ascending brick key.
+pub struct Bins<'b> {
+    entries: SpoolPeek<'b, BinEntry>,
+    next: u64,
+}
+
+impl<'b> BinSpools<'b> {
+    /// All bins.
+    #[must_use]
+    pub fn bins(&self) -> Bins<'b> {
+        Bins { entries: SpoolPeek::new(self.entries), next: 0 }
+    }
+
+    /// How many bins there are.
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn count(&self) -> Result<u64, StoreError> {
+        let mut bins = self.bins();
+        let mut count = 0;
+        while bins.next()?.is_some() {
+            count += 1;
+        }
+        Ok(count)
+    }
+
+    /// Visits the triangles of a bin block by block, by ascending source number. `resident` counts those that
+    /// are in memory at one time.
+    ///
+    /// # Errors
+    /// The scratch disk fails, or as `visit`.
+    pub fn each_block(
+        &self,
+        bin: &Bin,
+        resident: Option<&Resident>,
+        mut visit: impl FnMut(&[SoupTriangle]) -> Result<(), StoreError>,
+    ) -> Result<(), StoreError> {
+        let Range { start, end } = bin.entries;
+        let mut entries = SpoolPeek::range(self.entries, start, end - start);
+        let mut reader = self.triangles.reader(0, 0);
+        let mut block = Vec::new();
+        while let Some(entry) = entries.next()? {
+            let span = Span::from(entry, &mut entries)?;
+            let first = span.entries[0].first;
+            if span.entries.len() == 1 {
+                reader.turn_to(first, entry.count);
+                while let Some(block) = reader.next_block()? {
+                    let _block = resident.map(|resident| resident.hold(block.len()));
+                    visit(block)?;
+                }
+                continue;
+            }
+            self.triangles.read(first, (span.end - first) as usize, &mut block)?;
+            let _block = resident.map(|resident| resident.hold(block.len()));
+            for entry in &span.entries {
+                let at = (entry.first - first) as usize;
+                visit(&block[at..at + entry.count as usize])?;
+            }
+        }
+        Ok(())
+    }
+}
+
+/// Entries of a brick that are read at one time, with what lies between them.
+struct Span {
+    entries: Vec<BinEntry>,
+    /// Behind the last triangle.
+    end: u64,
+}
+
+impl Span {
+    /// `first` with those of the next entries that are near.
+    fn from(first: BinEntry, entries: &mut SpoolPeek<BinEntry>) -> Result<Self, StoreError> {
+        let mut span = Self { entries: vec![first], end: first.first + first.count };
+        while let Some(next) = entries.peek()? {
+            let end = next.first + next.count;
+            if next.first - span.end > MOST_BETWEEN || end - first.first > MOST_IN_SPAN {
+                break;
+            }
+            entries.next()?;
+            span.entries.push(next);
+            span.end = end;
+        }
+        Ok(span)
+    }
+}
+
+impl Bins<'_> {
+    /// The key of the next bin.
+    fn peek(&mut self) -> Result<Option<u64>, StoreError> {
+        Ok(self.entries.peek()?.map(|entry| entry.brick))
+    }
+
+    /// The next bin.
+    ///
+    /// # Errors
+    /// The scratch disk fails.
+    pub fn next(&mut self) -> Result<Option<Bin>, StoreError> {
+        let Some(brick) = self.peek()? else { return Ok(None) };
+        let mut bin = Bin::none(BrickKey(brick));
+        bin.entries = self.next..self.next;
+        while let Some(entry) = self.entries.peek()?.filter(|entry| entry.brick == brick) {
+            self.entries.next()?;
+            bin.entries.end += 1;
+            bin.count += entry.count;
+        }
+        self.next = bin.entries.end;
+        Ok(Some(bin))
+    }
+}
+
+impl Bin {
+    /// A brick without triangles.
+    fn none(brick: BrickKey) -> Self {
+        Self { brick, count: 0, entries: 0..0 }
+    }
 }
 
 /// The bins of a soup, as the stages after ingest see it.
@@ -45,20 +186,20 @@ pub struct BinnedSoup<'b> {
 pub struct SoupBin {
     /// The brick.
     pub brick: BrickKey,
-    /// Numbers of its triangles.
-    pub triangles: Range<u64>,
+    /// Its triangles.
+    triangles: Bin,
     /// Numbers of the drops that say which of them to leave out.
-    pub drops: Range<u64>,
-    /// Numbers of the triangles that were added.
-    pub added: Range<u64>,
+    drops: Range<u64>,
+    /// The triangles that were added.
+    added: Bin,
 }
 
 /// The bins by ascending brick key.
 pub struct BinWalk<'b> {
-    entries: SpoolPeek<'b, BinEntry>,
+    bins: Bins<'b>,
     drops: SpoolPeek<'b, DropRecord>,
     next_drop: u64,
-    added: Option<SpoolPeek<'b, BinEntry>>,
+    added: Option<Bins<'b>>,
 }
 
 impl<'b> BinnedSoup<'b> {
@@ -66,10 +207,10 @@ impl<'b> BinnedSoup<'b> {
     #[must_use]
     pub fn walk(&self) -> BinWalk<'b> {
         BinWalk {
-            entries: SpoolPeek::new(self.bins.entries),
+            bins: self.bins.bins(),
             drops: SpoolPeek::new(self.drops),
             next_drop: 0,
-            added: self.added.map(|added| SpoolPeek::new(added.entries)),
+            added: self.added.map(|added| added.bins()),
         }
     }
 }
@@ -80,27 +221,28 @@ impl BinWalk<'_> {
     /// # Errors
     /// The scratch disk fails.
     pub fn next_bin(&mut self) -> Result<Option<SoupBin>, StoreError> {
-        let entry = self.entries.peek()?;
-        let added = match &mut self.added {
+        let of_input = self.bins.peek()?;
+        let of_added = match &mut self.added {
             Some(added) => added.peek()?,
             None => None,
         };
-        let Some(key) = entry.iter().chain(&added).map(|entry| entry.brick).min() else {
-            return Ok(None);
-        };
-        let mut bin = SoupBin { brick: BrickKey(key), triangles: 0..0, drops: 0..0, added: 0..0 };
-        if let Some(BinEntry { first, count, .. }) = entry.filter(|entry| entry.brick == key) {
-            self.entries.next()?;
-            bin.triangles = first..first + count;
+        let Some(key) = of_input.iter().chain(&of_added).copied().min() else { return Ok(None) };
+        let brick = BrickKey(key);
+        let mut bin =
+            SoupBin { brick, triangles: Bin::none(brick), drops: 0..0, added: Bin::none(brick) };
+        if of_input == Some(key)
+            && let Some(triangles) = self.bins.next()?
+        {
+            bin.triangles = triangles;
             let first = self.next_drop;
             self.next_drop += self.drops.skip_while(|drop| drop.brick == key)?;
             bin.drops = first..self.next_drop;
         }
-        if let (Some(walk), Some(entry)) = (&mut self.added, added)
-            && entry.brick == key
+        if of_added == Some(key)
+            && let Some(walk) = &mut self.added
+            && let Some(added) = walk.next()?
         {
-            walk.next()?;
-            bin.added = entry.first..entry.first + entry.count;
+            bin.added = added;
         }
         Ok(Some(bin))
     }
@@ -110,7 +252,7 @@ impl SoupBin {
     /// How many triangles lie in it, with those that do not count.
     #[must_use]
     pub fn count(&self) -> u64 {
-        (self.triangles.end - self.triangles.start) + (self.added.end - self.added.start)
+        self.triangles.count + self.added.count
     }
 
     /// Visits its triangles that count, by ascending source number.
@@ -135,11 +277,9 @@ impl SoupBin {
         resident: Option<&Resident>,
         mut visit: impl FnMut(&SoupTriangle) -> Result<(), StoreError>,
     ) -> Result<(), StoreError> {
-        let length = |range: &Range<u64>| range.end - range.start;
-        let mut drops = SpoolPeek::range(soup.drops, self.drops.start, length(&self.drops));
-        let mut reader = soup.bins.triangles.reader(self.triangles.start, length(&self.triangles));
-        while let Some(block) = reader.next_block()? {
-            let _block = resident.map(|resident| resident.hold(block.len()));
+        let Range { start, end } = self.drops;
+        let mut drops = SpoolPeek::range(soup.drops, start, end - start);
+        soup.bins.each_block(&self.triangles, resident, |block| {
             for triangle in block {
                 // Both lists ascend by source number.
                 if drops.peek()?.is_some_and(|drop| drop.source == triangle.source) {
@@ -148,14 +288,10 @@ impl SoupBin {
                 }
                 visit(triangle)?;
             }
-        }
+            Ok(())
+        })?;
         let Some(added) = soup.added else { return Ok(()) };
-        let mut reader = added.triangles.reader(self.added.start, length(&self.added));
-        while let Some(block) = reader.next_block()? {
-            let _block = resident.map(|resident| resident.hold(block.len()));
-            block.iter().try_for_each(&mut visit)?;
-        }
-        Ok(())
+        added.each_block(&self.added, resident, |block| block.iter().try_for_each(&mut visit))
     }
 }
 

@@ -16,7 +16,7 @@ pub const ROWS: usize = LINES * LINES;
 pub const AXIS_EDGES: u32 = (ROWS * LINES) as u32;
 
 /// Bits of a row of corners.
-const CORNER_ROW: u64 = (1 << LINES) - 1;
+pub const CORNER_ROW: u64 = (1 << LINES) - 1;
 
 /// The number of the edge that runs along `axis` from corner `at` of the brick.
 #[must_use]
@@ -31,6 +31,13 @@ pub const fn edge_index(axis: usize, at: [usize; 3]) -> u32 {
 pub const fn edge_position(index: u32) -> (usize, [usize; 3]) {
     let (axis, rest) = ((index / AXIS_EDGES) as usize, (index % AXIS_EDGES) as usize);
     (axis, [rest % LINES, rest / LINES % LINES, rest / ROWS])
+}
+
+/// The row of an edge among those of all axes, one after the other, and its bit there.
+#[inline]
+const fn row_and_bit(index: u32) -> (usize, u64) {
+    let (row, x) = (index / LINES as u32, index % LINES as u32);
+    (row as usize, 1 << x)
 }
 
 /// One bit for every edge of a brick.
@@ -57,23 +64,23 @@ impl EdgeBits {
     /// Flips the bit of edge `index`.
     #[inline]
     pub fn toggle(&mut self, index: u32) {
-        let (axis, rest) = (index / AXIS_EDGES, index as usize % AXIS_EDGES as usize);
-        self.rows[axis as usize][rest / LINES] ^= 1 << (rest % LINES);
+        let (row, bit) = row_and_bit(index);
+        self.rows.as_flattened_mut()[row] ^= bit;
     }
 
     /// Sets the bit of edge `index`.
     #[inline]
     pub fn set(&mut self, index: u32) {
-        let (axis, rest) = (index / AXIS_EDGES, index as usize % AXIS_EDGES as usize);
-        self.rows[axis as usize][rest / LINES] |= 1 << (rest % LINES);
+        let (row, bit) = row_and_bit(index);
+        self.rows.as_flattened_mut()[row] |= bit;
     }
 
     /// The bit of edge `index`.
     #[must_use]
     #[inline]
     pub fn get(&self, index: u32) -> bool {
-        let (axis, rest) = (index / AXIS_EDGES, index as usize % AXIS_EDGES as usize);
-        self.rows[axis as usize][rest / LINES] >> (rest % LINES) & 1 == 1
+        let (row, bit) = row_and_bit(index);
+        self.rows.as_flattened()[row] & bit != 0
     }
 
     /// The rows of the edges along `axis`.
@@ -124,27 +131,30 @@ impl EdgeBits {
     #[must_use]
     pub fn odd_faces(&self, axis: usize) -> FaceBits {
         let mut faces = FaceBits { rows: Box::new([0; ROWS]) };
-        let [xs, ys, zs] = &*self.rows;
-        for row in 0..ROWS {
-            let (z, y) = (row / LINES, row % LINES);
-            faces.rows[row] = match axis {
-                0 if y < SIDE && z < SIDE => ys[row] ^ ys[row + LINES] ^ zs[row] ^ zs[row + 1],
-                1 if z < SIDE => {
-                    (xs[row] ^ xs[row + LINES] ^ zs[row] ^ zs[row] >> 1) & (CORNER_ROW >> 1)
-                }
-                2 if y < SIDE => {
-                    (xs[row] ^ xs[row + 1] ^ ys[row] ^ ys[row] >> 1) & (CORNER_ROW >> 1)
-                }
-                _ => 0,
-            };
+        for (row, bits) in faces.rows.iter_mut().enumerate() {
+            *bits = self.odd_faces_in_row(axis, row);
         }
         faces
+    }
+
+    #[inline]
+    fn odd_faces_in_row(&self, axis: usize, row: usize) -> u64 {
+        let [xs, ys, zs] = &*self.rows;
+        let (z, y) = (row / LINES, row % LINES);
+        match axis {
+            0 if y < SIDE && z < SIDE => ys[row] ^ ys[row + LINES] ^ zs[row] ^ zs[row + 1],
+            1 if z < SIDE => {
+                (xs[row] ^ xs[row + LINES] ^ zs[row] ^ zs[row] >> 1) & (CORNER_ROW >> 1)
+            }
+            2 if y < SIDE => (xs[row] ^ xs[row + 1] ^ ys[row] ^ ys[row] >> 1) & (CORNER_ROW >> 1),
+            _ => 0,
+        }
     }
 
     /// Whether no face is odd.
     #[must_use]
     pub fn is_closed(&self) -> bool {
-        (0..3).all(|axis| self.odd_faces(axis).rows.iter().all(|&row| row == 0))
+        (0..3).all(|axis| (0..ROWS).fold(0, |odd, row| odd | self.odd_faces_in_row(axis, row)) == 0)
     }
 }
 

@@ -24,7 +24,7 @@ mod touch;
 mod triangle;
 
 pub use ambiguous::{OWN_FACES, face_index, for_each_ambiguous_face};
-pub use binned::{BinEntry, BinSpools, BinWalk, BinnedSoup, SoupBin, write_bins};
+pub use binned::{Bin, BinEntry, BinSpools, BinWalk, BinnedSoup, SoupBin, write_bins};
 pub use border::{ArchivedBorder, Border, BorderBrick, decode_borders};
 pub use brick::{
     ArchiveSize, ArchivedHitBrick, ArchivedSignBrick, BrickError, Crossing, HitBrick, HitEdge,
@@ -37,7 +37,8 @@ pub use cell_brick::{
 };
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{
-    AXIS_EDGES, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index, edge_position,
+    AXIS_EDGES, CORNER_ROW, CornerBits, EdgeBits, FaceBits, LINES, ROWS, SIDE, edge_index,
+    edge_position,
 };
 pub use edge_brick::{ArchivedEdgeBrick, EdgeBrick, decode_edges};
 pub use exposed::{BURIED, ExposedPlace, LOST, Touched};

@@ -7,10 +7,7 @@
 //! Memory:     O(runs), a few thousand per brick.
 //! Source:     run-based connected components (Rosenfeld and Pfaltz 1966), on bit rows.
 
-use crate::octree::edge_bits::{EdgeBits, LINES, ROWS};
-
-/// A row of 33 set bits.
-const FULL_ROW: u64 = (1 << LINES) - 1;
+use crate::octree::edge_bits::{CORNER_ROW, EdgeBits, LINES, ROWS};
 
 /// The regions of one brick.
 #[derive(Clone, Debug, Default)]
@@ -73,7 +70,7 @@ fn split_rows(along: &[u64], regions: &mut Regions) {
 }
 
 fn push_runs(mut cuts: u64, runs: &mut Vec<u64>) {
-    let mut left = FULL_ROW;
+    let mut left = CORNER_ROW;
     while cuts != 0 {
         // The barrier lies between corner x and corner x + 1.
         let below = (2 << cuts.trailing_zeros()) - 1;

@@ -269,7 +269,7 @@ impl Run<'_> {
         let soup = Soup::open(resources, &workspace.files(), *findings.soup())?;
         let (bins, measure) = fill_bins(&soup, findings.domain(), resources)?;
         findings.measure = measure;
-        findings.bins = bins.entries.len();
+        findings.bins = bins.spools().count()?;
         findings.left_out = bins.left_out;
         if measure.area == 0.0 {
             return Err(RepairError::no_triangle(self.input, &findings.soup().stats));

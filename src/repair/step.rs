@@ -141,9 +141,9 @@ impl Step {
         match self {
             Self::Read => &[],
             Self::Bin => &[SOUP, ATTRIBUTES, LOOKS, LOOK_MATERIALS, PART_NAMES, MATERIALS, IMAGES],
-            Self::Settle => &[BINS, BIN_ENTRIES],
-            Self::Mend => &[BINS, BIN_ENTRIES, DROPS],
-            Self::Scan => &[BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
+            Self::Settle => &[SOUP, BINS, BIN_ENTRIES],
+            Self::Mend => &[SOUP, BINS, BIN_ENTRIES, DROPS],
+            Self::Scan => &[SOUP, BINS, BIN_ENTRIES, LEFT_OUT, ADDED, ADDED_ENTRIES],
             Self::Patch => &[HITS],
             Self::Flood => &[HITS, FLIPS],
             Self::Revise => &[

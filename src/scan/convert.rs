@@ -151,9 +151,10 @@ impl Converter {
             let cells = (x0 as f64 - (a + b) / na as f64) / self.cell as f64;
             let size = x0.abs() as f64 + (a.abs() + b.abs()) / na.abs() as f64;
             let error = size / self.cell as f64 * FILTER;
-            let below = cells.floor();
-            if cells - below > error && below + 1.0 - cells > error {
-                below as i64
+            let below = if error < 0.5 { floor(cells) } else { 0 };
+            let rest = cells - below as f64;
+            if rest > error && 1.0 - rest > error {
+                below
             } else {
                 let shift = i128::from(nu) * i128::from(line_u - u0)
                     + i128::from(nv) * i128::from(line_v - v0);
@@ -176,6 +177,13 @@ impl Converter {
         let leading = normal.iter().find(|&&n| n != 0).map_or(0, |n| n.signum());
         if leading * normal[axis].signum() > 0 { place - 1 } else { place }
     }
+}
+
+/// The largest integer that is not above a number of less than 2^62: the method for that takes longer.
+#[inline]
+fn floor(x: f64) -> i64 {
+    let whole = x as i64;
+    whole - i64::from(x < whole as f64)
 }
 
 /// The three edge functions of a triangle in the plane across an axis.

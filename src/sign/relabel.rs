@@ -2,8 +2,8 @@
 
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedHitBrick, Border, CornerBits, Crossing, Domain, EdgeBits, FlipRecord, Flips, HitEdge,
-    LINES, NO_PLANE, PATCH, ROWS, Regions, SIDE, SignBrick, SourcePlane, decode_borders,
+    ArchivedHitBrick, Border, CORNER_ROW, CornerBits, Crossing, Domain, EdgeBits, FlipRecord,
+    Flips, HitEdge, LINES, NO_PLANE, PATCH, ROWS, SIDE, SignBrick, SourcePlane, decode_borders,
     decode_hits, edge_position, encode, find_regions,
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
@@ -71,6 +71,14 @@ pub fn relabel(
     Ok((file, stats))
 }
 
+/// The corners of a row by their parity, that of the first corner of the brick first.
+fn parts_by_parity(parity: u64, base_inside: bool) -> impl Iterator<Item = (u64, u16)> {
+    let inside = parity & CORNER_ROW;
+    let outside = !parity & CORNER_ROW;
+    let [first, second] = if base_inside { [inside, outside] } else { [outside, inside] };
+    [(first, 0), (second, 1)].into_iter()
+}
+
 #[derive(Default)]
 struct Workspace {
     loaded: Loaded,
@@ -89,12 +97,18 @@ impl Workspace {
     ) -> Result<Relabelled, SignError> {
         let view = self.loaded.load(hits, &item.load)?;
         let record = view.as_ref().map(|view| decode_hits(view)).transpose()?;
-        let regions = find_regions(&self.loaded.barrier);
-        if usize::from(regions.count) != item.regions.len() {
-            return Err(contradiction(item, "as many regions as before"));
-        }
         self.parity.from_marks(&self.loaded.marks, item.base_inside);
-        self.set_signs(&regions, item, rule)?;
+        // Of two regions, with a change of parity at every barrier, parity tells which is where.
+        if item.regions.len() == 2 && self.loaded.barrier == self.loaded.marks {
+            let (parity, base) = (self.parity.clone(), item.base_inside);
+            self.set_signs(|row| parts_by_parity(parity.rows[row], base), item, rule)?;
+        } else {
+            let regions = find_regions(&self.loaded.barrier);
+            if usize::from(regions.count) != item.regions.len() {
+                return Err(contradiction(item, "as many regions as before"));
+            }
+            self.set_signs(|row| regions.row(row), item, rule)?;
+        }
         let flips = &item.load.flips;
         let cell_units = f64::from(domain.cell_units);
         let (mut brick, mut stats) = self.cross(record, flips, cell_units);
@@ -117,16 +131,17 @@ impl Workspace {
         Ok(Relabelled { key: item.load.brick.0, bytes, stats })
     }
 
-    /// Signs by the fill rule. What parity calls inside, the exterior never reaches: checked.
-    fn set_signs(
+    /// Signs by the fill rule, from the corners of each row with their regions. What parity calls inside, the
+    /// exterior never reaches: checked.
+    fn set_signs<P: Iterator<Item = (u64, u16)>>(
         &mut self,
-        regions: &Regions,
+        parts_of: impl Fn(usize) -> P,
         item: &RelabelItem,
         rule: FillRule,
     ) -> Result<(), SignError> {
         for row in 0..ROWS {
             let (mut inside, mut sealed, mut wound, mut untold) = (0, 0, 0, 0);
-            for (bits, region) in regions.row(row) {
+            for (bits, region) in parts_of(row) {
                 let known = item.regions[usize::from(region)];
                 inside |= if known & OUTSIDE != 0 { 0 } else { bits };
                 wound |= if known & WOUND != 0 { bits } else { 0 };

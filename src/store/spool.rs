@@ -251,6 +251,12 @@ pub struct SpoolReader<'s, R: Pod> {
 }
 
 impl<R: Pod> SpoolReader<'_, R> {
+    /// Goes on with the records `first..first + count`.
+    pub fn turn_to(&mut self, first: u64, count: u64) {
+        self.next = first;
+        self.end = (first + count).min(self.spool.len());
+    }
+
     /// The next records, `None` at the end.
     ///
     /// # Errors

@@ -43,6 +43,12 @@ impl Polygon {
         (polygon.count >= 3).then_some(polygon)
     }
 
+    /// How often two cells that follow each other around an edge have different vertices.
+    #[inline]
+    pub fn turns(ring: &[Patch; 4]) -> usize {
+        (0..4).filter(|slot| ring[*slot].id() != ring[(slot + 1) % 4].id()).count()
+    }
+
     /// The vertices in order.
     pub fn patches(&self) -> &[Patch] {
         &self.patches[..self.count]

@@ -107,14 +107,20 @@ fn add_ends(
     let at = place_of(number).map(|c| c as i32);
     let low = (1 << cut.level()) - 1;
     for axis in 0..3 {
-        let pairs = segments_on(packed, 2 * axis).pairs();
         // Within its own cluster there is no face.
-        if pairs.is_empty() || at[axis] & low != 0 {
+        if at[axis] & low != 0 {
+            continue;
+        }
+        let pairs = segments_on(packed, 2 * axis).pairs();
+        if pairs.is_empty() {
             continue;
         }
         let mut below = at;
         below[axis] -= 1;
-        let (here, there) = (nb.cell(at)?, nb.cell(below)?);
+        let (here, there) = (nb.own_cell(rank), nb.cell(below)?);
+        if Arc::never_misses(cut, nb.cut(there)) {
+            continue;
+        }
         for &pair in pairs {
             let edges = edges_of(pair, at);
             let upper = nb.vertex(here, pair[0]);

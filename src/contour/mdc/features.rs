@@ -145,7 +145,7 @@ impl Workspace {
     }
 
     /// The same on an edge that leaves the brick through `side`.
-    fn beyond_side(
+    pub(super) fn beyond_side(
         &mut self,
         place: Place,
         side: usize,

@@ -17,6 +17,7 @@ impl Workspace {
         leaves.hit_starts.clear();
         leaves.hits.clear();
         leaves.planes.clear();
+        leaves.blocks.clear();
         let cell_units = self.cell_units as f64;
         leaves.planes.extend(
             self.planes

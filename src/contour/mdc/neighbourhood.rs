@@ -7,7 +7,7 @@
 
 use crate::contour::ContourError;
 use crate::contour::mdc::cell::{cell_mask, cell_number, components_of, edge_in_cell, number_at};
-use crate::contour::mdc::cut_cell::{CutBox, steps_of};
+use crate::contour::mdc::cut_cell::{CutBox, CutCell, steps_of};
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::loaded::{Loaded, Vertex};
 use crate::contour::mdc::table::is_marked;
@@ -173,14 +173,33 @@ impl<'f> Neighbourhood<'f> {
         let side = SIDE as i32;
         let steps = at.map(|c| 1 + i32::from(c >= side) - i32::from(c < 0));
         let slot = (steps[0] + 3 * steps[1] + 9 * steps[2]) as usize;
-        let number = number_at(at.map(|c| (c & (side - 1)) as usize));
         if slot == OWN {
-            let rank = self.ranks[number];
-            return Ok((rank != NO_RANK).then_some(Found { slot, rank: usize::from(rank) }));
+            return Ok(self.find_within(at.map(|c| c as usize)));
         }
         let Some(brick) = self.brick(slot)? else { return Ok(None) };
+        let number = number_at(at.map(|c| (c & (side - 1)) as usize));
         let rank = brick.cells.binary_search_by_key(&number, |&cell| cell_number(cell));
         Ok(rank.ok().map(|rank| Found { slot, rank }))
+    }
+
+    /// Looks for a leaf cell of the own brick.
+    #[inline]
+    pub fn find_within(&self, at: [usize; 3]) -> Option<Found> {
+        let rank = self.ranks[number_at(at)];
+        (rank != NO_RANK).then_some(Found { slot: OWN, rank: usize::from(rank) })
+    }
+
+    /// The leaf cell of the own brick with this rank.
+    #[inline]
+    pub fn own_cell(&self, rank: usize) -> Found {
+        Found { slot: OWN, rank }
+    }
+
+    /// The cell of the cut that a leaf cell lies in.
+    #[inline]
+    pub fn cut(&self, found: Found) -> CutCell {
+        let brick = self.loaded(found);
+        brick.vertices[brick.firsts[found.rank] as usize].cut
     }
 
     /// A leaf cell that sound bricks have.

@@ -165,7 +165,13 @@ impl<'p> Polygons<'p> {
         inside_below: bool,
         out: &mut BrickTriangles,
     ) -> Result<Option<[Patch; 4]>, ContourError> {
-        let ring = edge.ring(&mut self.nb)?;
+        let ring = match edge.ring_within(&self.nb) {
+            Some(ring) => ring,
+            None => edge.ring(&mut self.nb)?,
+        };
+        if Polygon::turns(&ring) < 3 {
+            return Ok(Some(ring));
+        }
         let crossing = self.nb.crossing_at(edge.axis, edge.lower, offset);
         if ring.iter().all(|patch| patch.vertex.cut.is_plain()) {
             out.stats.polygons += 1;

@@ -6,6 +6,7 @@
 //! Invariant:  a vertex lies strictly inside its cell, and no two share a position.
 
 use crate::contour::mdc::cell::{JOINED_FACES, ONE_VERTEX_BIT, components_of, place_of};
+use crate::contour::mdc::cluster::BlockPlace;
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::flags_of;
 use crate::contour::mdc::plain::later;
@@ -86,12 +87,11 @@ impl Workspace {
         self.touched.find(&self.marks);
         let mut stats = ContourStats::default();
         let mut brick = CellBrick { banned, ..CellBrick::default() };
+        let place = Place { signs, key: BrickKey(key) };
         for word in 0..self.touched.0.len() {
-            let mut bits = self.touched.0[word];
-            while bits != 0 {
-                let number = word * 64 + bits.trailing_zeros() as usize;
-                bits &= bits - 1;
-                self.place_in_cell(signs, BrickKey(key), number, &mut brick, &mut stats)?;
+            let bits = self.touched.0[word];
+            if bits != 0 {
+                self.place_in_word(place, word, bits, &mut brick, &mut stats)?;
             }
         }
         self.place_waiting(&mut brick, &mut stats);
@@ -118,10 +118,37 @@ impl Workspace {
         Ok((brick, stats))
     }
 
+    /// Places the vertices of 64 cells, those with bits, as blocks where that can be.
+    fn place_in_word(
+        &mut self,
+        place: Place,
+        word: usize,
+        bits: u64,
+        brick: &mut CellBrick,
+        stats: &mut ContourStats,
+    ) -> Result<(), ContourError> {
+        let block = BlockPlace { level: 2, number: word };
+        if self.take_block(place, block, bits, brick, stats)? {
+            return Ok(());
+        }
+        for octant in 0..8 {
+            let mut bits = bits >> (8 * octant) & 0xff;
+            let block = BlockPlace { level: 1, number: 8 * word + octant };
+            if bits == 0 || self.take_block(place, block, bits, brick, stats)? {
+                continue;
+            }
+            while bits != 0 {
+                let number = block.first() | bits.trailing_zeros() as usize;
+                bits &= bits - 1;
+                self.place_in_cell(place, number, brick, stats)?;
+            }
+        }
+        Ok(())
+    }
+
     fn place_in_cell(
         &mut self,
-        signs: &BrickFile,
-        key: BrickKey,
+        place: Place,
         number: usize,
         brick: &mut CellBrick,
         stats: &mut ContourStats,
@@ -132,7 +159,7 @@ impl Workspace {
         if self.method == Method::Dc {
             cell |= ONE_VERTEX_BIT;
         } else {
-            let (joined, turned) = self.joined_faces(signs, key, at, mask)?;
+            let (joined, turned) = self.joined_faces(place.signs, place.key, at, mask)?;
             cell |= u32::from(joined) << JOINED_FACES;
             stats.flipped_faces += u64::from(turned);
         }
@@ -145,7 +172,6 @@ impl Workspace {
         if self.method == Method::Dmc {
             self.place_in_middle(at, masks, brick);
         } else if components.count == 1 && is_clustering && self.surfaces == SurfaceDetail::None {
-            let place = Place { signs, key };
             let own = self.add_borderless_leaf(at, mask, masks[0]);
             if self.is_plain(place, at, own.all())? {
                 brick.positions.push(later(brick.cells.len()));
@@ -154,7 +180,6 @@ impl Workspace {
                 self.place_alone(place, at, &around, brick, stats)?;
             }
         } else if components.count == 1 {
-            let place = Place { signs, key };
             let around = self.around(at, masks[0]);
             let border = self.border_planes(at, &around);
             if is_clustering {
@@ -177,6 +202,17 @@ impl Workspace {
             }
             self.place_apart(at, masks, brick, stats);
         }
+        self.add_own_edges(at, mask, brick);
+        brick.cells.push(cell);
+        stats.cells += 1;
+        stats.multi_cells += u64::from(components.count > 1);
+        stats.cell_vertices += u64::from(components.count);
+        Ok(())
+    }
+
+    /// Adds the crossings of the edges from the min corner of a cell.
+    #[inline]
+    pub(super) fn add_own_edges(&self, at: [usize; 3], mask: u8, brick: &mut CellBrick) {
         for axis in 0..3 {
             if (mask ^ mask >> (1 << axis)) & 1 == 1 {
                 let EdgeCrossing { offset, surface, source, .. } = self.crossing(axis, at);
@@ -189,10 +225,5 @@ impl Workspace {
                 }
             }
         }
-        brick.cells.push(cell);
-        stats.cells += 1;
-        stats.multi_cells += u64::from(components.count > 1);
-        stats.cell_vertices += u64::from(components.count);
-        Ok(())
     }
 }

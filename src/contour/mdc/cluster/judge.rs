@@ -7,7 +7,7 @@ use glam::DVec3;
 use crate::contour::mdc::cell::{cell_mask, cell_number, place_of, segments_on};
 use crate::contour::mdc::cluster::cut::{Cut, Mark};
 use crate::contour::mdc::cluster::node::Node;
-use crate::contour::mdc::cluster::planes::{largest_distance, place};
+use crate::contour::mdc::cluster::planes::{CellPlane, Group, PlaneHit, largest_distance, place};
 use crate::contour::mdc::cluster::{Cell, ClusterOptions, Clustering};
 use crate::contour::mdc::reach::SHARP_CELLS;
 use crate::contour::mdc::table::AMBIGUOUS_FACES;
@@ -122,33 +122,14 @@ impl Clustering {
     /// Places the vertex of a piece; `is_alone` tells that it is all that the cell has.
     fn place(&self, cut: &Cut, cell: &Cell, number: usize, is_alone: bool) -> Placed {
         let node = &self.nodes[number];
-        let ClusterOptions { cell_units, inset_units, .. } = self.options;
-        let size = (1 << cell.level) as f64;
-        let low = place_of(cell.number).map(|c| (c << cell.level) as f64);
-        let half = size * 0.5;
-        let centre = DVec3::from(low) + half;
-        let reach = half - inset_units as f64 / cell_units as f64;
-        let mut options = self.options.qef;
-        (options.lo, options.hi) = (DVec3::splat(-reach), DVec3::splat(reach));
         let first = node.first_group as usize;
         let groups = &self.groups[first..first + node.groups as usize];
         let middle = node.points / node.count.max(1.0);
         let planes = &cut.leaves.planes;
-        let solution = place(groups, planes, centre, middle, &options);
-        if solution.clamped {
+        let Some(vertex) = self.vertex_of(cell, groups, middle, planes) else {
             return Placed::Outside;
-        }
-        let at = solution.position + centre;
-        let vertex: [i32; 3] = std::array::from_fn(|a| {
-            let low = low[a] as i64 * cell_units;
-            let units = (at[a] * cell_units as f64).round() as i64;
-            units.clamp(low + inset_units, low + size as i64 * cell_units - inset_units) as i32
-        });
-        let at = DVec3::from(vertex.map(f64::from)) / cell_units as f64;
-        let error = |components| {
-            let hits = cut.hits_in(components);
-            largest_distance(hits, planes, at, self.options.threshold_cells)
         };
+        let error = |components| self.error_of(vertex, cut.hits_in(components), planes);
         let all = cut.components_in(&cell.leaves);
         let largest = if is_alone {
             error(all)
@@ -157,5 +138,44 @@ impl Clustering {
             own.try_fold(0.0_f64, |largest, one| Some(largest.max(error(one..one + 1)?)))
         };
         largest.map_or(Placed::TooFar, |error| Placed::Fits(vertex, error))
+    }
+
+    /// The vertex of these groups on the lattice, strictly inside the cell; `None` if it lies elsewhere.
+    pub(super) fn vertex_of(
+        &self,
+        cell: &Cell,
+        groups: &[Group],
+        middle: DVec3,
+        planes: &[CellPlane],
+    ) -> Option<[i32; 3]> {
+        let ClusterOptions { cell_units, inset_units, .. } = self.options;
+        let size = (1 << cell.level) as f64;
+        let low = place_of(cell.number).map(|c| (c << cell.level) as f64);
+        let half = size * 0.5;
+        let centre = DVec3::from(low) + half;
+        let reach = half - inset_units as f64 / cell_units as f64;
+        let mut options = self.options.qef;
+        (options.lo, options.hi) = (DVec3::splat(-reach), DVec3::splat(reach));
+        let solution = place(groups, planes, centre, middle, &options);
+        if solution.clamped {
+            return None;
+        }
+        let at = solution.position + centre;
+        Some(std::array::from_fn(|a| {
+            let low = low[a] as i64 * cell_units;
+            let units = (at[a] * cell_units as f64).round() as i64;
+            units.clamp(low + inset_units, low + size as i64 * cell_units - inset_units) as i32
+        }))
+    }
+
+    /// The largest distance of a vertex to the planes of `hits`; `None` if one is beyond the threshold.
+    pub(super) fn error_of(
+        &self,
+        vertex: [i32; 3],
+        hits: &[PlaneHit],
+        planes: &[CellPlane],
+    ) -> Option<f64> {
+        let at = DVec3::from(vertex.map(f64::from)) / self.options.cell_units as f64;
+        largest_distance(hits, planes, at, self.options.threshold_cells)
     }
 }

@@ -12,8 +12,10 @@
 //! Source:     Schaefer, Ju, Warren 2007 (vertex clustering); the cut of whole cells and the third
 //!             rule are additions of ours.
 
+mod block;
 mod corners;
 mod cut;
+mod disk;
 mod judge;
 mod node;
 mod planes;
@@ -26,6 +28,8 @@ use std::ops::Range;
 
 use glam::DVec3;
 
+pub use block::{BLOCK_LEVEL, Block, BlockPlace};
+pub use disk::{MOST_CELLS, disk_in_block};
 pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
 pub use summary::{Part, join};
 
@@ -65,8 +69,10 @@ pub struct Leaves {
     pub components: Vec<u32>,
     /// First hit of every component, and their total.
     pub hit_starts: Vec<u32>,
-    /// Crossings, component after component.
+    /// Crossings, component after component; of a block each once, at its first component.
     pub hits: Vec<PlaneHit>,
+    /// Blocks of cells that are one vertex.
+    pub blocks: Vec<Block>,
 }
 
 /// Why pieces of surface are not one vertex.
@@ -97,6 +103,7 @@ pub struct Clustering {
     has_ambiguous_faces: bool,
     merged: Vec<Node>,
     merged_groups: Vec<Group>,
+    next_block: usize,
     /// Refusals so far in the brick.
     pub refusals: Refusals,
 }
@@ -136,6 +143,7 @@ impl Clustering {
             has_ambiguous_faces: false,
             merged: Vec::new(),
             merged_groups: Vec::new(),
+            next_block: 0,
             refusals: Refusals::default(),
         }
     }
@@ -146,6 +154,7 @@ impl Clustering {
         self.refusals = Refusals::default();
         self.nodes.clear();
         self.groups.clear();
+        self.next_block = 0;
         self.node_of.clear();
         self.node_of.resize(brick.positions.len(), 0);
         self.corners.reset(&brick.reaches);
@@ -169,6 +178,11 @@ impl Clustering {
         if cell.level == 0 {
             self.visit_leaf(cut, cell.leaves.start);
             return true;
+        }
+        if cell.level <= BLOCK_LEVEL
+            && let Some(is_alive) = self.take_block(cut, cell)
+        {
+            return is_alive;
         }
         let before = (self.nodes.len(), self.groups.len());
         let mark = cut.mark();

@@ -35,6 +35,12 @@ impl EdgeCounts {
         Self([BYTES[(edges & 0xff) as usize], BYTES[(edges >> 8) as usize]])
     }
 
+    /// So many crossings of each edge.
+    pub fn of_counts(counts: [u8; 12]) -> Self {
+        let word = |counts: &[u8]| counts.iter().rev().fold(0, |word, n| word << 8 | u64::from(*n));
+        Self([word(&counts[..8]), word(&counts[8..])])
+    }
+
     /// The sum of all.
     #[inline]
     pub const fn sum(&self) -> u32 {
@@ -155,7 +161,13 @@ impl Node {
     /// The piece in a leaf cell that crosses these edges.
     #[inline]
     pub fn leaf(edges: u16) -> Self {
-        Self { edges: EdgeCounts::of_leaf(edges), euler: 1, ..Self::EMPTY }
+        Self::disk(EdgeCounts::of_leaf(edges))
+    }
+
+    /// A disk that crosses the edges of its cell so often.
+    #[inline]
+    pub fn disk(edges: EdgeCounts) -> Self {
+        Self { edges, euler: 1, ..Self::EMPTY }
     }
 
     /// Adds the child in `octant`, but for its planes.

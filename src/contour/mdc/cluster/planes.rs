@@ -92,6 +92,30 @@ impl Group {
         is_alike.then_some(if dot < 0.0 { -normal } else { normal })
     }
 
+    /// Takes in a crossing if its normal points the same way, up to sign.
+    #[inline]
+    fn take_in_hit(&mut self, hit: &PlaneHit, planes: &[CellPlane], cosine_squared: f64) -> bool {
+        let normal = planes[hit.plane as usize].normal;
+        let Some(normal) = self.turned(hit.plane, normal, cosine_squared) else {
+            return self.take_in(&Self::of(hit, planes), planes, cosine_squared);
+        };
+        self.normals += normal;
+        self.points += DVec3::from(hit.point.map(f64::from));
+        self.count += 1.0;
+        true
+    }
+
+    /// Whether a unit normal points the same way, up to sign.
+    #[inline]
+    pub fn is_along(&self, normal: DVec3, cosine_squared: f64) -> bool {
+        self.normals.dot(normal).powi(2) >= cosine_squared * self.normals.length_squared()
+    }
+
+    /// The sum of its crossings, and how many there are.
+    pub fn crossings(&self) -> (DVec3, f64) {
+        (self.points, self.count)
+    }
+
     /// Whether both are of one plane: by its number, or as two triangles of one face have it.
     fn is_same_plane(&self, other: &Self, planes: &[CellPlane]) -> bool {
         if self.plane == MIXED || other.plane == MIXED {
@@ -104,7 +128,7 @@ impl Group {
     }
 
     /// The group as one crossing of its mean plane, about `centre`.
-    fn mean(&self, planes: &[CellPlane], centre: DVec3) -> Hit {
+    pub fn mean(&self, planes: &[CellPlane], centre: DVec3) -> Hit {
         let mut point = self.points / self.count;
         if self.plane == MIXED {
             let normal = self.normals.normalize_or_zero();
@@ -131,16 +155,34 @@ pub fn add_hit(
     cosine_squared: f64,
 ) -> bool {
     // Most cells have one group.
-    if let Some(known) = groups.get_mut(from) {
-        let normal = planes[hit.plane as usize].normal;
-        if let Some(normal) = known.turned(hit.plane, normal, cosine_squared) {
-            known.normals += normal;
-            known.points += DVec3::from(hit.point.map(f64::from));
-            known.count += 1.0;
-            return true;
-        }
+    if let Some(known) = groups.get_mut(from)
+        && known.take_in_hit(hit, planes, cosine_squared)
+    {
+        return true;
     }
     add_group(groups, from, &Group::of(hit, planes), planes, cosine_squared)
+}
+
+/// The groups of these crossings, if they are no more than two; both are the first where they are one.
+pub fn one_or_two_groups(
+    hits: &[PlaneHit],
+    planes: &[CellPlane],
+    cosine_squared: f64,
+) -> Option<(usize, [Group; 2])> {
+    let mut groups = [Group::of(hits.first()?, planes); 2];
+    let mut count = 1;
+    for hit in &hits[1..] {
+        if groups[0].take_in_hit(hit, planes, cosine_squared) {
+            continue;
+        }
+        if count == 1 {
+            groups[1] = Group::of(hit, planes);
+            count = 2;
+        } else if !groups[1].take_in_hit(hit, planes, cosine_squared) {
+            return None;
+        }
+    }
+    Some((count, groups))
 }
 
 /// Adds `group` to a list of groups that starts at `from`; false if there is no room.

@@ -8,6 +8,7 @@ use super::*;
 use crate::contour::mdc::cell::{edges_of_mask, lower_end};
 use crate::contour::mdc::table::axis_of_edge;
 use crate::mesh::shapes::Random;
+use crate::octree::{CornerBits, LINES};
 
 const CELL_UNITS: i64 = 1 << 12;
 
@@ -216,4 +217,61 @@ fn a_lip_of_one_cell_on_a_plate_is_no_part_of_a_cluster() {
         let has_step = (0..2).all(|a| low[a] <= 27 && 27 < low[a] + side) && side > 8;
         assert!(!has_step, "a cluster at {low:?} of {side} cells holds the lip");
     }
+}
+
+#[test]
+fn a_block_is_a_disk_by_bits_where_it_is_one_by_joining_its_cells() {
+    let mut random = Random::new(11);
+    let (mut disks, mut others) = (0, 0);
+    for round in 0..12 {
+        let field = blobs(&mut random);
+        let share = if round % 3 == 2 { 0.02 } else { 0.0 };
+        let mut flipped = HashSet::new();
+        for _ in 0..(share * 33.0_f64.powi(3)) as usize {
+            flipped.insert(random.point().map(|c| (c * 33.0) as usize));
+        }
+        let is_inside = |at: [usize; 3]| field(at) ^ flipped.contains(&at);
+        let (brick, leaves) = brick_of(is_inside, anywhere);
+        let mut signs = CornerBits::default();
+        for (row, bits) in signs.rows.iter_mut().enumerate() {
+            let inside = (0..LINES).filter(|x| is_inside([*x, row % LINES, row / LINES]));
+            *bits = inside.fold(0, |bits, x| bits | 1 << x);
+        }
+        let mut clustering = Clustering::new(options(1.0));
+        for (rank, &cell) in brick.cells.iter().enumerate() {
+            clustering.ranks[cell_number(cell)] = rank as u16;
+        }
+        for level in [1, 2] {
+            let block_of = |cell: u32| cell_number(cell) >> (3 * level);
+            let mut start = 0;
+            for block in brick.cells.chunk_by(|a, b| block_of(*a) == block_of(*b)) {
+                let cell =
+                    Cell { level, number: block_of(block[0]), leaves: start..start + block.len() };
+                start += block.len();
+                let is_single = |cell: &u32| {
+                    components_of(*cell).count == 1
+                        && AMBIGUOUS_FACES[usize::from(cell_mask(*cell))] == 0
+                };
+                if !block.iter().all(is_single) {
+                    continue;
+                }
+                let mut copy = brick.clone();
+                let positions = std::mem::take(&mut copy.positions);
+                let mut cut =
+                    Cut { brick: &mut copy, leaves: &leaves, positions, placed: Vec::new() };
+                clustering.nodes.clear();
+                clustering.groups.clear();
+                clustering.node_of = vec![0; brick.positions.len()];
+                clustering.visit(&mut cut, &cell);
+                let one = match &clustering.nodes[..] {
+                    [node] if node.is_simple() => Some(node.edges),
+                    _ => None,
+                };
+                let low = place_of(cell.number << (3 * level));
+                assert_eq!(disk_in_block(&signs, low, 1 << level), one, "{low:?}");
+                *if one.is_some() { &mut disks } else { &mut others } += 1;
+            }
+        }
+    }
+    assert!(disks > 300 && others > 300, "{disks} disks, {others} others");
 }
