@@ -80,10 +80,11 @@ impl Workspace {
         let made = self.gather(place, (low, side), &mut leaves)?.and_then(|leaving| {
             let (hits, planes) = (&leaves.hits[first_hit..], &leaves.planes);
             let clustering = self.clustering.as_ref()?;
+            let cosine_squared = clustering.cosine_squared();
             let made = clustering.block(block, edges, hits, planes)?;
             let are_along = leaving.numbers[..leaving.count]
                 .iter()
-                .all(|number| clustering.is_along(&made, self.normals[*number as usize]));
+                .all(|number| made.is_along(self.normals[*number as usize], cosine_squared));
             let has_crease = |[at, along]: [DVec3; 2]| {
                 self.is_on_surface((low, side), at, along) && self.has_no_corner((low, side), &made)
             };
@@ -156,16 +157,11 @@ impl Workspace {
             if !is_beyond {
                 continue;
             }
-            for i in 0..=side_cells {
-                for j in 0..=side_cells {
-                    let mut corner = low;
-                    corner[(axis + 1) % 3] += i;
-                    corner[(axis + 2) % 3] += j;
-                    let number = self.beyond_side(place, side, corner)?;
-                    if number != 0 {
-                        leaving.note(number);
-                    }
-                }
+            let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
+            let beyond = self.beyond(place, side)?;
+            for row in low[v]..=low[v] + side_cells {
+                let numbers = &beyond[row * LINES + low[u]..][..=side_cells];
+                numbers.iter().filter(|number| **number != 0).for_each(|n| leaving.note(*n));
             }
         }
         Ok(Some(leaving))
@@ -207,6 +203,7 @@ impl Workspace {
     /// end there in a corner.
     fn has_no_corner(&self, (low, side): ([usize; 3], usize), block: &Block) -> bool {
         let Some(clustering) = &self.clustering else { return false };
+        let cosine_squared = clustering.cosine_squared();
         let [from, to] = [0, 1].map(|end| {
             low.map(|c| if end == 0 { c.saturating_sub(1) } else { (c + side + 1).min(SIDE) })
         });
@@ -222,7 +219,7 @@ impl Workspace {
                         last = number;
                         is_known
                             || number != 0
-                                && clustering.is_along(block, self.normals[number as usize])
+                                && block.is_along(self.normals[number as usize], cosine_squared)
                     })
                 })
             })

@@ -145,18 +145,23 @@ impl Workspace {
     }
 
     /// The same on an edge that leaves the brick through `side`.
-    pub(super) fn beyond_side(
+    fn beyond_side(
         &mut self,
         place: Place,
         side: usize,
         corner: [usize; 3],
     ) -> Result<u32, ContourError> {
+        let (u, v) = ((side / 2 + 1) % 3, (side / 2 + 2) % 3);
+        Ok(self.beyond(place, side)?[corner[v] * LINES + corner[u]])
+    }
+
+    /// The same on all edges that leave the brick through `side`, row by row: rows run along the axis after
+    /// that of the side.
+    pub(super) fn beyond(&mut self, place: Place, side: usize) -> Result<&[u32], ContourError> {
         if !self.halo.is_loaded[side] {
             self.load_side(place, side)?;
         }
-        let axis = side / 2;
-        let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
-        Ok(self.halo.sides[side][corner[v] * LINES + corner[u]])
+        Ok(&self.halo.sides[side])
     }
 
     /// Loads the crossings on edges that leave the brick through `side`.

@@ -35,6 +35,8 @@ pub struct Block {
     place: BlockPlace,
     node: Node,
     groups: [Group; 2],
+    /// The ways that these point.
+    directions: [DVec3; 2],
     vertex: [i32; 3],
     error: f64,
 }
@@ -43,6 +45,13 @@ impl Block {
     /// Whether its planes are one group: no crease passes it.
     pub fn is_flat(&self) -> bool {
         self.node.groups == 1
+    }
+
+    /// Whether a unit normal could be of one of its groups: the square of the cosine between them is not less
+    /// than told.
+    #[inline]
+    pub fn is_along(&self, normal: DVec3, cosine_squared: f64) -> bool {
+        self.directions.iter().any(|one| one.dot(normal).powi(2) >= cosine_squared)
     }
 
     /// Where its two groups of planes meet, if their normals have a cosine of less than `cosine`: the point
@@ -105,12 +114,8 @@ impl Clustering {
         let cell = Cell { level: place.level, number: place.number, leaves: 0..0 };
         let vertex = self.vertex_of(&cell, &groups[..count], node.points / node.count, planes)?;
         let error = self.error_of(vertex, hits, planes)?;
-        Some(Block { place, node, groups, vertex, error })
-    }
-
-    /// Whether a unit normal could be of this block.
-    pub fn is_along(&self, block: &Block, normal: DVec3) -> bool {
-        block.groups().iter().any(|group| group.is_along(normal, self.cosine_squared))
+        let directions = groups.map(|group| group.direction());
+        Some(Block { place, node, groups, directions, vertex, error })
     }
 
     /// The next block, if it is this cell: whether its parent may still be a cluster, and then its piece is

@@ -44,7 +44,7 @@ struct Passed {
 /// meets each side of the block in one arc at most.
 pub fn disk_in_block(signs: &CornerBits, low: [usize; 3], side: usize) -> Option<EdgeCounts> {
     let rows = Rows::of(signs, low, side);
-    let edges = EdgeCounts::of_counts(rows.block_edges());
+    let edges = rows.block_edges();
     if !Node::disk(edges).is_simple() {
         return None;
     }
@@ -69,21 +69,31 @@ impl Rows {
     }
 
     /// How often the edges of the block are crossed.
-    fn block_edges(&self) -> [u8; 12] {
+    fn block_edges(&self) -> EdgeCounts {
         let (rows, side) = (&self.rows, self.side);
-        let mut counts = [0; 12];
-        for corner in (0..8_u8).filter(|corner| corner.count_ones() < 3) {
-            let [x, y, z] = [0, 1, 2].map(|a| usize::from(corner >> a & 1) * side);
-            for axis in (0..3_u8).filter(|axis| corner >> axis & 1 == 0) {
-                let crossed = match axis {
-                    0 => ((rows[z][y] ^ rows[z][y] >> 1) & self.cells).count_ones() as u8,
-                    1 => (0..side).map(|y| ((rows[z][y] ^ rows[z][y + 1]) >> x & 1) as u8).sum(),
-                    _ => (0..side).map(|z| ((rows[z][y] ^ rows[z + 1][y]) >> x & 1) as u8).sum(),
-                };
-                counts[usize::from(edge_at_corner(corner, axis))] = crossed;
+        let mut edges = EdgeCounts::default();
+        let mut add = |axis: u8, corner: u8, count: u64| {
+            edges.add_to(edge_at_corner(corner, axis), count);
+        };
+        for high_z in [0, 1] {
+            for high_y in [0, 1] {
+                let row = rows[side * usize::from(high_z)][side * usize::from(high_y)];
+                let crossed = (row ^ row >> 1) & self.cells;
+                add(0, high_y << 1 | high_z << 2, u64::from(crossed.count_ones()));
             }
         }
-        counts
+        for high in [0, 1] {
+            let at = side * usize::from(high);
+            for step in 0..side {
+                let along_y = rows[at][step] ^ rows[at][step + 1];
+                add(1, high << 2, along_y & 1);
+                add(1, 1 | high << 2, along_y >> side & 1);
+                let along_z = rows[step][at] ^ rows[step + 1][at];
+                add(2, high << 1, along_z & 1);
+                add(2, 1 | high << 1, along_z >> side & 1);
+            }
+        }
+        edges
     }
 
     /// The faces between two rows of corners that have both signs.

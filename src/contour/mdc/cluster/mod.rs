@@ -148,6 +148,11 @@ impl Clustering {
         }
     }
 
+    /// The square of the cosine of half the crease angle, within which normals are one group.
+    pub fn cosine_squared(&self) -> f64 {
+        self.cosine_squared
+    }
+
     /// Clusters the vertices of `brick`, which are one for every component of its cells; no cell
     /// of `brick.banned` becomes a cluster.
     pub fn cut(&mut self, brick: &mut CellBrick, leaves: &Leaves) {

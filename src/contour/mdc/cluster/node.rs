@@ -35,10 +35,10 @@ impl EdgeCounts {
         Self([BYTES[(edges & 0xff) as usize], BYTES[(edges >> 8) as usize]])
     }
 
-    /// So many crossings of each edge.
-    pub fn of_counts(counts: [u8; 12]) -> Self {
-        let word = |counts: &[u8]| counts.iter().rev().fold(0, |word, n| word << 8 | u64::from(*n));
-        Self([word(&counts[..8]), word(&counts[8..])])
+    /// Adds crossings of one edge.
+    #[inline]
+    pub const fn add_to(&mut self, edge: u8, count: u64) {
+        self.0[edge as usize / 8] += count << (8 * (edge % 8));
     }
 
     /// The sum of all.

@@ -105,10 +105,9 @@ impl Group {
         true
     }
 
-    /// Whether a unit normal points the same way, up to sign.
-    #[inline]
-    pub fn is_along(&self, normal: DVec3, cosine_squared: f64) -> bool {
-        self.normals.dot(normal).powi(2) >= cosine_squared * self.normals.length_squared()
+    /// The way that its normals point, of unit length.
+    pub fn direction(&self) -> DVec3 {
+        self.normals.normalize_or_zero()
     }
 
     /// The sum of its crossings, and how many there are.
