@@ -80,9 +80,9 @@ impl Workshop {
         let soup =
             read_soup(&mut source, false, Attributes::NONE, &resources).expect("ingest works");
         let domain = Domain::around(&soup.facts.bounds, depth, false).expect("room enough");
-        let (bins, _) = fill_bins(&soup, &domain, &resources).expect("ingest works");
-        let settled =
-            settle(&bins, &domain, soup.facts.stats.triangles, &resources).expect("ingest works");
+        let triangles = soup.facts.stats.triangles;
+        let (bins, _) = fill_bins(soup, &domain, &resources).expect("ingest works");
+        let settled = settle(&bins, &domain, triangles, &resources).expect("ingest works");
         Ingested { domain, bins, settled }
     }
 

@@ -58,19 +58,12 @@ impl Bins {
     ) -> Result<Self, StoreError> {
         let copies = Spool::open(resources.scratch, FileState::find(files, BINS)?)?;
         let entries = Spool::open(resources.scratch, FileState::find(files, BIN_ENTRIES)?)?;
-        Self::of(copies, entries, FileState::find(files, SOUP)?, left_out, resources)
-    }
-
-    fn of(
-        copies: Spool<SoupTriangle>,
-        entries: Spool<BinEntry>,
-        soup: &FileState,
-        left_out: LeftOut,
-        resources: &Resources,
-    ) -> Result<Self, StoreError> {
         let state = copies.state().clone();
-        let triangles =
-            if copies.is_empty() { Spool::open(resources.scratch, soup)? } else { copies };
+        let triangles = if copies.is_empty() {
+            Spool::open(resources.scratch, FileState::find(files, SOUP)?)?
+        } else {
+            copies
+        };
         Ok(Self { triangles, entries, left_out, copies: state })
     }
 
@@ -98,14 +91,17 @@ impl Bins {
 /// # Errors
 /// The scratch disk fails, or the caller cancels.
 pub fn fill_bins(
-    soup: &Soup,
+    soup: Soup,
     domain: &Domain,
     resources: &Resources,
 ) -> Result<(Bins, SoupMeasure), StoreError> {
-    match list_entries(soup, domain, resources)? {
-        Some(listed) => Ok(listed),
-        None => sort_copies(soup, domain, resources),
-    }
+    let Some((entries, measure)) = list_entries(&soup, domain, resources)? else {
+        return sort_copies(&soup, domain, resources);
+    };
+    let none = SpoolWriter::<SoupTriangle>::create(resources.scratch, BINS)?.finish()?;
+    let copies = none.state().clone();
+    let bins = Bins { triangles: soup.spool, entries, left_out: LeftOut::default(), copies };
+    Ok((bins, measure))
 }
 
 /// Lists which triangles of the soup each brick has; `None` where it takes too many entries, or the soup does
@@ -114,7 +110,7 @@ fn list_entries(
     soup: &Soup,
     domain: &Domain,
     resources: &Resources,
-) -> Result<Option<(Bins, SoupMeasure)>, StoreError> {
+) -> Result<Option<(Spool<BinEntry>, SoupMeasure)>, StoreError> {
     if !soup.looks.is_none() {
         return Ok(None);
     }
@@ -160,15 +156,12 @@ fn list_entries(
     if !serves.into_inner() {
         return Ok(None);
     }
-    let copies = SpoolWriter::create(resources.scratch, BINS)?.finish()?;
     let mut spool = SpoolWriter::create(resources.scratch, BIN_ENTRIES)?;
     let mut sorted = sorter.finish()?;
     while let Some(entry) = sorted.next()? {
         spool.push(entry)?;
     }
-    let left_out = filter.left_out();
-    let bins = Bins::of(copies, spool.finish()?, soup.spool.state(), left_out, resources)?;
-    Ok(Some((bins, histogram.finish())))
+    Ok(Some((spool.finish()?, histogram.finish())))
 }
 
 /// The entries of triangles that lie in the soup from `first` on.
@@ -239,6 +232,6 @@ fn sort_copies(
         |(binned, _held)| sorter.extend(&binned),
     )?;
     let (triangles, entries) = write_bins(sorter, [BINS, BIN_ENTRIES], resources)?;
-    let (soup, left_out) = (soup.spool.state(), filter.left_out());
-    Ok((Bins::of(triangles, entries, soup, left_out, resources)?, histogram.finish()))
+    let copies = triangles.state().clone();
+    Ok((Bins { triangles, entries, left_out: filter.left_out(), copies }, histogram.finish()))
 }

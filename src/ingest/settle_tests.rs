@@ -40,8 +40,9 @@ fn settled(soup: &[Corners], depth: u32, share_bytes: u64, threads: usize) -> Sa
     let mut source = ListedTriangles::without_indices(soup.to_vec());
     let read = read_soup(&mut source, true, Attributes::NONE, &resources).expect("a sound soup");
     let domain = Domain::around(&read.facts.bounds, depth, false).expect("room enough");
-    let (bins, _) = fill_bins(&read, &domain, &resources).expect("room on the disk");
-    let settled = settle(&bins, &domain, read.facts.stats.triangles, &resources).expect("room");
+    let triangles = read.facts.stats.triangles;
+    let (bins, _) = fill_bins(read, &domain, &resources).expect("room on the disk");
+    let settled = settle(&bins, &domain, triangles, &resources).expect("room");
     let mut left: BTreeMap<u64, BTreeSet<u32>> = BTreeMap::new();
     let mut drops = Vec::new();
     let spools = bins.spools();

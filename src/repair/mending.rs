@@ -1,12 +1,12 @@
 //! The step that mends the soup before it is scanned.
 
 use crate::bridge::{HoleRule, Known, MendOptions, mend};
-use crate::ingest::{Bins, Settled};
+use crate::ingest::Settled;
 use crate::repair::RepairError;
 use crate::repair::length::Reach;
 use crate::repair::run::Run;
 use crate::repair::settings::MaxHole;
-use crate::repair::stages::Findings;
+use crate::repair::stages::{Findings, Handles, open_bins};
 use crate::repair::workspace::Workspace;
 use crate::store::{FileState, Resources};
 
@@ -15,11 +15,11 @@ impl Run<'_> {
         &self,
         workspace: &Workspace,
         findings: &mut Findings,
+        handles: &mut Handles,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        let files = workspace.files();
-        let bins = Bins::open(resources, &files, findings.left_out)?;
-        let settled = Settled::open(resources, &files, findings.settle)?;
+        let bins = open_bins(&mut handles.bins, workspace, findings, resources)?;
+        let settled = Settled::open(resources, &workspace.files(), findings.settle)?;
         let soup = bins.without(&settled.drops);
         let stats = &findings.soup().stats;
         let known = Known {

@@ -47,7 +47,11 @@ impl Run<'_> {
         let files = workspace.files();
         let (flips, flooded) = (Flips::open(resources, &files)?, Flooded::open(resources, &files)?);
         let mut scanned = Scanned { flips, flooded, files: Vec::new() };
-        let bins = Bins::open(resources, &files, findings.left_out)?;
+        // No later step reads them.
+        let bins = match handles.bins.take() {
+            Some(bins) => bins,
+            None => Bins::open(resources, &files, findings.left_out)?,
+        };
         let mended = Mended::open(resources, &files)?;
         let mut soup = mended.soup(bins.spools());
         let hits = open_bricks(&mut handles.hits, HITS, workspace, resources)?;

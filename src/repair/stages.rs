@@ -111,10 +111,11 @@ impl Findings {
     }
 }
 
-/// Brick files that are handed from step to step while the run lasts. A later run, and a step that
+/// Bins and brick files that are handed from step to step while the run lasts. A later run, and a step that
 /// finds none here, opens them.
 #[derive(Default)]
 pub struct Handles {
+    pub(crate) bins: Option<Bins>,
     pub(crate) hits: Option<BrickFile>,
     pub(crate) borders: Option<BrickFile>,
     pub(crate) signs: Option<BrickFile>,
@@ -140,6 +141,22 @@ pub(crate) fn open_bricks<'h>(
     }
 }
 
+/// The bins in `held`, or those that an earlier run left.
+pub(crate) fn open_bins<'h>(
+    held: &'h mut Option<Bins>,
+    workspace: &Workspace,
+    findings: &Findings,
+    resources: &Resources,
+) -> Result<&'h Bins, StoreError> {
+    match held {
+        Some(bins) => Ok(bins),
+        None => {
+            let bins = Bins::open(resources, &workspace.files(), findings.left_out)?;
+            Ok(held.insert(bins))
+        }
+    }
+}
+
 impl Run<'_> {
     /// Does one step; the files that it left.
     pub(crate) fn step(
@@ -153,9 +170,9 @@ impl Run<'_> {
         self.recording.begin(step.stage(), self.work_of(step, findings));
         let files = match step {
             Step::Read => self.read(findings, resources)?,
-            Step::Bin => self.bin(workspace, findings, resources)?,
-            Step::Settle => self.settle(workspace, findings, resources)?,
-            Step::Mend => self.mend(workspace, findings, resources)?,
+            Step::Bin => self.bin(workspace, findings, handles, resources)?,
+            Step::Settle => self.settle(workspace, findings, handles, resources)?,
+            Step::Mend => self.mend(workspace, findings, handles, resources)?,
             Step::Scan => scan_bins(workspace, findings, handles, resources)?,
             Step::Patch => patch_bricks(workspace, findings, handles, resources)?,
             Step::Flood => {
@@ -260,6 +277,7 @@ impl Run<'_> {
         &self,
         workspace: &Workspace,
         findings: &mut Findings,
+        handles: &mut Handles,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
         // Images of parts belong to the whole.
@@ -267,28 +285,31 @@ impl Run<'_> {
             self.keep_images(workspace, findings)?;
         }
         let soup = Soup::open(resources, &workspace.files(), *findings.soup())?;
-        let (bins, measure) = fill_bins(&soup, findings.domain(), resources)?;
+        let (bins, measure) = fill_bins(soup, findings.domain(), resources)?;
         findings.measure = measure;
         findings.bins = bins.spools().count()?;
         findings.left_out = bins.left_out;
         if measure.area == 0.0 {
             return Err(RepairError::no_triangle(self.input, &findings.soup().stats));
         }
-        Ok(bins.files())
+        let files = bins.files();
+        handles.bins = Some(bins);
+        Ok(files)
     }
 
     fn settle(
         &self,
         workspace: &Workspace,
         findings: &mut Findings,
+        handles: &mut Handles,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        let bins = Bins::open(resources, &workspace.files(), findings.left_out)?;
+        let bins = open_bins(&mut handles.bins, workspace, findings, resources)?;
         let (triangles, area) = (findings.soup().stats.triangles, findings.measure.area);
         let domain = findings.domain();
-        let settled = settle(&bins, domain, triangles, resources)?;
+        let settled = settle(bins, domain, triangles, resources)?;
         let rule = self.settings.sheets;
-        let settled = drop_fins(&bins, settled, rule, domain, (triangles, area), resources)?;
+        let settled = drop_fins(bins, settled, rule, domain, (triangles, area), resources)?;
         findings.settle = settled.stats;
         Ok(vec![settled.drops.state().clone()])
     }
@@ -430,9 +451,8 @@ fn scan_bins(
     handles: &mut Handles,
     resources: &Resources,
 ) -> Result<Vec<FileState>, RepairError> {
-    let files = workspace.files();
-    let bins = Bins::open(resources, &files, findings.left_out)?;
-    let mended = Mended::open(resources, &files)?;
+    let bins = open_bins(&mut handles.bins, workspace, findings, resources)?;
+    let mended = Mended::open(resources, &workspace.files())?;
     let soup = mended.soup(bins.spools());
     let (hits, stats) = scan(&soup, findings.domain(), resources)?;
     findings.scan = stats;

@@ -38,8 +38,9 @@ fn scanned<T>(soup: &[Corners], depth: u32, look: impl FnOnce(&BrickFile, &Domai
     let mut source = ListedTriangles::without_indices(soup.to_vec());
     let read = read_soup(&mut source, true, Attributes::NONE, &resources).expect("a sound soup");
     let domain = Domain::around(&read.facts.bounds, depth, false).expect("room enough");
-    let (bins, _) = fill_bins(&read, &domain, &resources).expect("room on the disk");
-    let settled = settle(&bins, &domain, read.facts.stats.triangles, &resources).expect("room");
+    let triangles = read.facts.stats.triangles;
+    let (bins, _) = fill_bins(read, &domain, &resources).expect("room on the disk");
+    let settled = settle(&bins, &domain, triangles, &resources).expect("room");
     assert_eq!(settled.stats.duplicate_triangles, 0, "duplicates are another test's business");
     let soup = bins.without(&settled.drops);
     let (bricks, _) = scan(&soup, &domain, &resources).expect("room");

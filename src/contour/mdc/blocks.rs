@@ -1,12 +1,13 @@
-//! Blocks of four or two cells a side in which the surface is smooth and simple: most of them, away from features.
-//! They become clusters as a whole, and their cells need no vertices.
+//! Blocks of four or two cells a side in which the surface is simple: most of them, away from corners. They
+//! become clusters as a whole, and their cells need no vertices.
 //!
 //! In:         the cells of a block that the surface passes, and the crossings of its brick and of edges that
 //!             leave it.
 //! Out:        the block among the leaves of the cut, and its cells in the record; or nothing, and then its
 //!             cells are placed one by one.
-//! Invariant:  all cells of a block that is taken are plain, as `plain` has it: no normal on their edges or
-//!             on those that leave the block differs by half the crease angle from that of the block.
+//! Invariant:  the normals on the edges of a block that is taken, and on those that leave it, are one group
+//!             or two, as clusters have them. Where the two meet in a crease, no vertex of its cells wants
+//!             to be elsewhere for it (`block_creases`). So no feature is lost that its cells would keep.
 //! Units:      cells, from the brick's min corner.
 //! Memory:     20 bytes a crossing, with the leaves.
 //! Fails:      as for features.
@@ -14,12 +15,8 @@
 
 use std::ops::RangeInclusive;
 
-use glam::DVec3;
-
 use crate::contour::mdc::cell::{components_of, place_of};
-use crate::contour::mdc::cluster::{
-    Block, BlockPlace, Leaves, MOST_CELLS, PlaneHit, disk_in_block,
-};
+use crate::contour::mdc::cluster::{BlockPlace, Leaves, MOST_CELLS, PlaneHit, disk_in_block};
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::plain::later;
 use crate::contour::mdc::table::AMBIGUOUS_FACES;
@@ -29,9 +26,6 @@ use crate::octree::{CellBrick, LINES, ROWS, SIDE};
 
 /// Blocks with fewer cells are left to these.
 const FEWEST_CELLS: u32 = 4;
-
-/// How far apart the places are where a crease is looked at.
-const CREASE_STEP_CELLS: f64 = 0.2;
 
 /// Edges that leave a block through its sides.
 const MOST_LEAVING: usize = 6 * (MOST_CELLS + 1) * (MOST_CELLS + 1);
@@ -85,11 +79,7 @@ impl Workspace {
             let are_along = leaving.numbers[..leaving.count]
                 .iter()
                 .all(|number| made.is_along(self.normals[*number as usize], cosine_squared));
-            let has_crease = |[at, along]: [DVec3; 2]| {
-                self.is_on_surface((low, side), at, along) && self.has_no_corner((low, side), &made)
-            };
-            let is_fine =
-                are_along && made.crease(planes, self.crease_cosine).is_none_or(has_crease);
+            let is_fine = are_along && self.keeps_crease((low, side), &made, planes);
             is_fine.then_some(made)
         });
         let is_taken = made.is_some();
@@ -167,65 +157,6 @@ impl Workspace {
         Ok(Some(leaving))
     }
 
-    /// Whether the crease at `at` passes only cells with surface in a block and the cells around it. Where it
-    /// passes others, vertices want to reach it, and stay those of leaf cells.
-    fn is_on_surface(&self, (low, side): ([usize; 3], usize), at: DVec3, along: DVec3) -> bool {
-        let low = low.map(|c| c as i32);
-        let reach = (side as f64 * 0.5 + 1.0) * DVec3::ONE.length();
-        let centre = DVec3::from(low.map(f64::from)) + side as f64 * 0.5;
-        let start = at + along * along.dot(centre - at);
-        let steps = (reach / CREASE_STEP_CELLS) as i32;
-        (-steps..=steps).all(|step| {
-            let point = start + along * (f64::from(step) * CREASE_STEP_CELLS);
-            let cell = point.to_array().map(|c| (c + 1.0) as i32 - 1);
-            let is_near = (0..3).all(|a| (low[a] - 1..=low[a] + side as i32).contains(&cell[a]));
-            !is_near || self.has_surface(cell)
-        })
-    }
-
-    /// Whether the surface passes a cell, as far as the corners of the brick tell.
-    fn has_surface(&self, cell: [i32; 3]) -> bool {
-        let last = SIDE as i32;
-        let corners = (0..8).filter_map(|corner| {
-            let at: [i32; 3] = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
-            let is_here = at.iter().all(|c| (0..=last).contains(c));
-            is_here.then(|| self.signs.get(at.map(|c| c as usize)))
-        });
-        let [mut is_inside, mut is_outside] = [false; 2];
-        corners.for_each(|inside| {
-            is_inside |= inside;
-            is_outside |= !inside;
-        });
-        is_inside && is_outside
-    }
-
-    /// Whether no plane in the cells around a block with a crease differs from both of its own: then it does not
-    /// end there in a corner.
-    fn has_no_corner(&self, (low, side): ([usize; 3], usize), block: &Block) -> bool {
-        let Some(clustering) = &self.clustering else { return false };
-        let cosine_squared = clustering.cosine_squared();
-        let [from, to] = [0, 1].map(|end| {
-            low.map(|c| if end == 0 { c.saturating_sub(1) } else { (c + side + 1).min(SIDE) })
-        });
-        let mut last = 0;
-        (0..3).all(|axis| {
-            // Edges along an axis end where the last cell does.
-            let last_of = |a: usize| if a == axis { to[a] - 1 } else { to[a] };
-            (from[2]..=last_of(2)).all(|z| {
-                (from[1]..=last_of(1)).all(|y| {
-                    self.each_crossing_in_row(axis, [y, z], from[0]..=last_of(0), |_, crossing| {
-                        let number = crossing.normal;
-                        let is_known = number == last;
-                        last = number;
-                        is_known
-                            || number != 0
-                                && block.is_along(self.normals[number as usize], cosine_squared)
-                    })
-                })
-            })
-        })
-    }
-
     /// Shows the crossings on the edges of the block from `low`, and on those of the brick that leave it, until
     /// `visit` has seen enough; whether it saw all.
     #[inline]
@@ -257,7 +188,7 @@ impl Workspace {
 
     /// Shows the crossings of a row of edges along `axis` in a range along x, as each of the above.
     #[inline]
-    fn each_crossing_in_row(
+    pub(super) fn each_crossing_in_row(
         &self,
         axis: usize,
         [y, z]: [usize; 2],

@@ -14,6 +14,7 @@ mod angles;
 mod arcs;
 mod around_cell;
 mod around_edge;
+mod block_creases;
 mod blocks;
 mod borders;
 mod cell;
