@@ -28,7 +28,7 @@ const ITEM_TRIANGLES: usize = 2048;
 
 /// Entries are of the soup itself while they hold so many triangles on average; shorter ones would be read
 /// piecemeal.
-const FEWEST_IN_ENTRY: u64 = 6;
+const FEWEST_IN_ENTRY: u64 = 3;
 /// Entries that there may be before that is asked.
 const FREE_ENTRIES: u64 = 4096;
 /// Entries under way that a triangle may continue.
@@ -235,3 +235,6 @@ fn sort_copies(
     let copies = triangles.state().clone();
     Ok((Bins { triangles, entries, left_out: filter.left_out(), copies }, histogram.finish()))
 }
+
+#[cfg(test)]
+mod tests;
