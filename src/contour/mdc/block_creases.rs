@@ -42,7 +42,8 @@ impl Workspace {
         let steps = (reach / CREASE_STEP_CELLS) as i32;
         (-steps..=steps).all(|step| {
             let point = start + along * (f64::from(step) * CREASE_STEP_CELLS);
-            let cell = point.to_array().map(|c| (c + 1.0) as i32 - 1);
+            // Rounded down: nothing that is near lies below -1.
+            let cell = point.to_array().map(|c| (c + 2.0) as i32 - 2);
             let is_near = (0..3).all(|a| (low[a] - 1..=low[a] + side as i32).contains(&cell[a]));
             !is_near || self.has_surface(cell)
         })
