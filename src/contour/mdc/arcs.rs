@@ -13,6 +13,7 @@ use crate::contour::mdc::cut_cell::{CutBox, CutCell};
 use crate::contour::mdc::loaded::{face_point_key, far_point_key};
 use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};
 use crate::contour::mdc::table::{axis_of_edge, edge_at_corner};
+use crate::octree::SIDE;
 
 /// An edge of the grid: its direction and its lower end.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
@@ -31,6 +32,9 @@ impl Edge {
     /// [`ContourError::Contradiction`].
     #[inline]
     pub fn ring(&self, nb: &mut Neighbourhood) -> Result<[Patch; 4], ContourError> {
+        if let Some(ring) = self.ring_within(nb) {
+            return Ok(ring);
+        }
         let mut ring = [None; 4];
         for (patch, (down, number)) in ring.iter_mut().zip(AROUND[self.axis]) {
             let found = nb.cell(std::array::from_fn(|a| self.lower[a] - down[a]))?;
@@ -41,8 +45,9 @@ impl Edge {
 
     /// The same where all four cells are in the own brick: a shorter way.
     #[inline]
-    pub fn ring_within(&self, nb: &Neighbourhood) -> Option<[Patch; 4]> {
-        let is_within = (0..3).all(|a| a == self.axis || self.lower[a] > 0);
+    fn ring_within(&self, nb: &Neighbourhood) -> Option<[Patch; 4]> {
+        let is_within =
+            (0..3).all(|a| (i32::from(a != self.axis)..SIDE as i32).contains(&self.lower[a]));
         if !is_within {
             return None;
         }

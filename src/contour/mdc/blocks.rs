@@ -209,7 +209,7 @@ impl Workspace {
         while left != 0 {
             let at = first + left.trailing_zeros() as usize;
             left &= left - 1;
-            let Some(crossing) = crossings.next() else { return true };
+            let crossing = crossings.next().expect("marks are of crossings");
             if !visit(at, *crossing) {
                 return false;
             }

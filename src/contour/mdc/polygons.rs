@@ -165,10 +165,7 @@ impl<'p> Polygons<'p> {
         inside_below: bool,
         out: &mut BrickTriangles,
     ) -> Result<Option<[Patch; 4]>, ContourError> {
-        let ring = match edge.ring_within(&self.nb) {
-            Some(ring) => ring,
-            None => edge.ring(&mut self.nb)?,
-        };
+        let ring = edge.ring(&mut self.nb)?;
         if Polygon::turns(&ring) < 3 {
             return Ok(Some(ring));
         }

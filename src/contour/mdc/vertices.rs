@@ -6,7 +6,7 @@
 //! Invariant:  a vertex lies strictly inside its cell, and no two share a position.
 
 use crate::contour::mdc::cell::{JOINED_FACES, ONE_VERTEX_BIT, components_of, place_of};
-use crate::contour::mdc::cluster::BlockPlace;
+use crate::contour::mdc::cluster::{BLOCK_LEVEL, BlockPlace};
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::flags_of;
 use crate::contour::mdc::plain::later;
@@ -127,13 +127,13 @@ impl Workspace {
         brick: &mut CellBrick,
         stats: &mut ContourStats,
     ) -> Result<(), ContourError> {
-        let block = BlockPlace { level: 2, number: word };
+        let block = BlockPlace { level: BLOCK_LEVEL, number: word };
         if self.take_block(place, block, bits, brick, stats)? {
             return Ok(());
         }
         for octant in 0..8 {
             let mut bits = bits >> (8 * octant) & 0xff;
-            let block = BlockPlace { level: 1, number: 8 * word + octant };
+            let block = BlockPlace { level: BLOCK_LEVEL - 1, number: 8 * word + octant };
             if bits == 0 || self.take_block(place, block, bits, brick, stats)? {
                 continue;
             }

@@ -10,12 +10,13 @@
 //! Fails:      never.
 //! Source:     the criterion of Schaefer, Ju, Warren 2007, section 4; by bits is ours.
 
+use crate::contour::mdc::cluster::block::BLOCK_LEVEL;
 use crate::contour::mdc::cluster::node::{EdgeCounts, Node};
 use crate::contour::mdc::table::edge_at_corner;
 use crate::octree::{CornerBits, LINES};
 
 /// Most cells along a side of a block: its cells are the bits of a word.
-pub const MOST_CELLS: usize = 4;
+pub const MOST_CELLS: usize = 1 << BLOCK_LEVEL;
 /// Most corners along a side.
 const CORNERS: usize = MOST_CELLS + 1;
 
