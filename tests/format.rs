@@ -6,9 +6,9 @@ use std::path::Path;
 use brickmend::geom::morton;
 use brickmend::octree::{
     AXIS_EDGES, AttributeRecord, BinEntry, BrickKey, CellBrick, Crossing, DropRecord, EdgeBrick,
-    FlipRecord, HitBrick, HitEdge, LINES, MAX_HITS, PATCH, SIDE, SignBrick, SoupTriangle,
-    SourcePlane, TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs, edge_index,
-    encode, face_index,
+    FlipRecord, HitBrick, HitEdge, LINES, MAX_HITS, NarrowTriangle, PATCH, SIDE, SignBrick,
+    SoupTriangle, SourcePlane, TRANSPARENT, decode_cells, decode_edges, decode_hits, decode_signs,
+    edge_index, encode, face_index,
 };
 use brickmend::paint::{AskedPlace, DrawnCorner, DrawnTriangle};
 use brickmend::scan::HAS_ODD_FACES;
@@ -87,6 +87,15 @@ fn records_of_spools_are_as_documented() {
     );
     assert_eq!(TRANSPARENT, 1 << 31);
     says("SoupTriangle", "(bits 0..30), light passes (bit 31)");
+    check_record::<NarrowTriangle>(
+        "NarrowTriangle",
+        &[
+            offset_of!(NarrowTriangle, corners),
+            offset_of!(NarrowTriangle, source),
+            offset_of!(NarrowTriangle, part),
+            offset_of!(NarrowTriangle, material),
+        ],
+    );
     check_record::<AttributeRecord>(
         "AttributeRecord",
         &[

@@ -46,7 +46,7 @@ use crate::bridge::shells::Shells;
 use crate::bridge::walls::raise_walls;
 use crate::octree::{
     BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, Panes, SnapBox, SoupEdges,
-    SoupTriangle, for_each_touched_brick, write_bins,
+    SoupSpool, SoupTriangle, for_each_touched_brick, write_bins,
 };
 use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError};
 
@@ -152,7 +152,7 @@ pub struct Mended {
     /// Triangles to leave out, by brick and source number.
     pub left_out: Spool<DropRecord>,
     /// Triangles that were added.
-    pub triangles: Spool<SoupTriangle>,
+    pub triangles: SoupSpool,
     /// Their bins.
     pub entries: Spool<BinEntry>,
     /// See [`ORIGINS`].
@@ -168,7 +168,7 @@ impl Mended {
         let scratch = resources.scratch;
         Ok(Self {
             left_out: Spool::open(scratch, FileState::find(files, LEFT_OUT)?)?,
-            triangles: Spool::open(scratch, FileState::find(files, ADDED)?)?,
+            triangles: SoupSpool::open(scratch, FileState::find(files, ADDED)?)?,
             entries: Spool::open(scratch, FileState::find(files, ADDED_ENTRIES)?)?,
             origins: Spool::open(scratch, FileState::find(files, ORIGINS)?)?,
         })

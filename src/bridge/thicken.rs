@@ -21,7 +21,7 @@ use crate::bridge::walls::Slab;
 use crate::bridge::{Added, Like, MendOptions};
 use crate::octree::{
     BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, LostHits, Panes, SoupBin, SoupEdges,
-    SoupTriangle, write_bins,
+    SoupSpool, SoupTriangle, write_bins,
 };
 use crate::store::{Resources, Sorter, Spool, StoreError};
 
@@ -49,7 +49,7 @@ pub struct ThickenStats {
 
 /// All that is added to a soup.
 pub struct Thickened {
-    triangles: Spool<SoupTriangle>,
+    triangles: SoupSpool,
     entries: Spool<BinEntry>,
     /// See [`SLAB_ORIGINS`].
     pub origins: Spool<u32>,

@@ -10,8 +10,8 @@ use crate::deviate::triangles::{BLOCK, Triangle, Triangles, each_of_soup};
 use crate::deviate::{DeviateError, Means};
 use crate::geom::mix_words;
 use crate::mesh::{MeshSource, TriangleBatch};
-use crate::octree::SoupTriangle;
-use crate::store::{Sequence, Spool, StoreError};
+use crate::octree::SoupSpool;
+use crate::store::{Sequence, StoreError};
 
 /// A hash of numbers, the same for both zeros.
 #[inline]
@@ -101,7 +101,7 @@ impl TapeWriter {
 
 /// Goes through a soup, which is finite, and leaves its triangles where they are; `note` hears of each.
 pub(crate) fn survey_soup<'s>(
-    spool: &'s Spool<SoupTriangle>,
+    spool: &'s SoupSpool,
     means: &Means<'_>,
     mut note: impl FnMut(&Triangle) -> Result<(), StoreError>,
 ) -> Result<Tape<'s>, StoreError> {

@@ -9,8 +9,8 @@ use crate::deviate::samples::{Sample, take_samples};
 use crate::deviate::tree::Tree;
 use crate::deviate::{DeviateError, Means};
 use crate::mesh::MeshSource;
-use crate::octree::SoupTriangle;
-use crate::store::{Sequence, Spool, StoreError};
+use crate::octree::SoupSpool;
+use crate::store::{Sequence, StoreError};
 
 /// What is asked of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -54,7 +54,7 @@ impl<'s> Surface<'s> {
     /// # Errors
     /// The scratch disk fails, or the caller cancels.
     pub fn of_soup(
-        soup: &'s Spool<SoupTriangle>,
+        soup: &'s SoupSpool,
         options: &SurfaceOptions,
         means: &Means<'_>,
     ) -> Result<Option<Self>, StoreError> {

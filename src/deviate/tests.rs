@@ -13,8 +13,8 @@ use crate::mesh::shapes::{
     Corners, ListedTriangles, Random, cuboid, rotation, sphere, torus, transform,
 };
 use crate::monitor::Void;
-use crate::octree::SoupTriangle;
-use crate::store::{Scratch, Spool, SpoolWriter};
+use crate::octree::{SoupSpool, SoupTriangle, SoupWriter};
+use crate::store::Scratch;
 
 const SAMPLES: u64 = 2000;
 const SMALL: u64 = 16 << 10;
@@ -46,8 +46,8 @@ impl Workshop {
         surface.expect("the scratch disk works").expect("it has an area")
     }
 
-    fn soup(&self, triangles: &[Corners]) -> Spool<SoupTriangle> {
-        let mut spool = SpoolWriter::create(&self.scratch, "soup.spool").expect("writable");
+    fn soup(&self, triangles: &[Corners]) -> SoupSpool {
+        let mut spool = SoupWriter::create(&self.scratch, "soup.spool").expect("writable");
         for (source, &corners) in (0..).zip(triangles) {
             let triangle = SoupTriangle { corners, source, part: 0, material: 0, stands_for: 0 };
             spool.push(triangle).expect("writable");

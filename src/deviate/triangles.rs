@@ -6,8 +6,8 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::octree::SoupTriangle;
-use crate::store::{Sequence, Spool, StoreError};
+use crate::octree::{SoupSpool, SoupTriangle};
+use crate::store::{Sequence, StoreError};
 
 /// Triangles at one time on their way from where they lie.
 pub(crate) const BLOCK: usize = 1024;
@@ -93,7 +93,7 @@ impl<R: Pod> Blocks for Sequence<R> {
 /// Where triangles lie.
 pub(crate) enum Triangles<'s> {
     Taped(Sequence<Triangle>),
-    Spooled(&'s Spool<SoupTriangle>),
+    Spooled(&'s SoupSpool),
 }
 
 impl Blocks for Triangles<'_> {
@@ -131,7 +131,7 @@ impl Blocks for Triangles<'_> {
 
 /// Shows all triangles of a soup in order.
 pub(crate) fn each_of_soup(
-    spool: &Spool<SoupTriangle>,
+    spool: &SoupSpool,
     mut visit: impl FnMut(&Triangle) -> Result<(), StoreError>,
 ) -> Result<(), StoreError> {
     let (mut reader, mut number) = (spool.reader(0, spool.len()), 0);

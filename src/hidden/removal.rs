@@ -13,7 +13,7 @@ use glam::DVec3;
 use crate::hidden::bodies::each_triangle;
 use crate::hidden::{Bodies, HiddenBody, HiddenStats, Verdict, Verdicts};
 use crate::octree::{
-    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupTriangle, write_bins,
+    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupSpool, write_bins,
 };
 use crate::store::{Record, Resources, Sorter, Spool, SpoolWriter, StoreError};
 
@@ -26,7 +26,7 @@ const MOST_TOLD: usize = 32;
 /// What is left of a soup.
 pub struct Seen {
     drops: Spool<DropRecord>,
-    triangles: Spool<SoupTriangle>,
+    triangles: SoupSpool,
     entries: Spool<BinEntry>,
 }
 

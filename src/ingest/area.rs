@@ -29,6 +29,7 @@ pub struct AreaHistogram {
     centre: [f64; 3],
     longest: f64,
     slices_per_unit: f64,
+    /// Area along each axis: of each triangle half where it begins and half where it ends.
     slices: [Vec<f64>; 3],
     area: f64,
     signed_volume: f64,
@@ -59,16 +60,12 @@ impl AreaHistogram {
             for axis in 0..3 {
                 let to_lo = self.centre[axis] - self.bounds.lo[axis];
                 let slice = |coordinate: f64| {
-                    (((coordinate + to_lo) * self.slices_per_unit) as usize).min(SLICES - 1)
+                    let slice = ((coordinate + to_lo) * self.slices_per_unit) as i32;
+                    slice.clamp(0, SLICES as i32 - 1) as usize
                 };
-                let first = slice(p[axis].min(q[axis]).min(r[axis]));
-                let last = slice(p[axis].max(q[axis]).max(r[axis]));
-                if first == last {
-                    self.slices[axis][first] += area;
-                } else {
-                    let each = area / (last - first + 1) as f64;
-                    self.slices[axis][first..=last].iter_mut().for_each(|slice| *slice += each);
-                }
+                let (low, high) = (p[axis].min(q[axis]), p[axis].max(q[axis]));
+                self.slices[axis][slice(low.min(r[axis]))] += area * 0.5;
+                self.slices[axis][slice(high.max(r[axis]))] += area * 0.5;
             }
         }
     }

@@ -14,8 +14,8 @@ use crate::ingest::crowds::{CrowdFilter, LeftOut};
 use crate::ingest::soup::{SOUP, Soup};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupTriangle,
-    for_each_touched_brick, write_bins,
+    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupSpool, SoupTriangle,
+    SoupWriter, for_each_touched_brick, write_bins,
 };
 use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
 
@@ -37,7 +37,7 @@ const OPEN_ENTRIES: usize = 16;
 /// The bins of all bricks.
 pub struct Bins {
     /// The triangles: sorted copies, or the soup as it is where neighbours follow each other in the file.
-    pub triangles: Spool<SoupTriangle>,
+    pub triangles: SoupSpool,
     /// Where those of each brick lie, by ascending brick key.
     pub entries: Spool<BinEntry>,
     /// What is in no bin.
@@ -56,11 +56,11 @@ impl Bins {
         files: &[FileState],
         left_out: LeftOut,
     ) -> Result<Self, StoreError> {
-        let copies = Spool::open(resources.scratch, FileState::find(files, BINS)?)?;
+        let copies = SoupSpool::open(resources.scratch, FileState::find(files, BINS)?)?;
         let entries = Spool::open(resources.scratch, FileState::find(files, BIN_ENTRIES)?)?;
         let state = copies.state().clone();
         let triangles = if copies.is_empty() {
-            Spool::open(resources.scratch, FileState::find(files, SOUP)?)?
+            SoupSpool::open(resources.scratch, FileState::find(files, SOUP)?)?
         } else {
             copies
         };
@@ -98,7 +98,7 @@ pub fn fill_bins(
     let Some((entries, measure)) = list_entries(&soup, domain, resources)? else {
         return sort_copies(&soup, domain, resources);
     };
-    let none = SpoolWriter::<SoupTriangle>::create(resources.scratch, BINS)?.finish()?;
+    let none = SoupWriter::create(resources.scratch, BINS)?.finish()?;
     let copies = none.state().clone();
     let bins = Bins { triangles: soup.spool, entries, left_out: LeftOut::default(), copies };
     Ok((bins, measure))

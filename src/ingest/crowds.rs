@@ -23,8 +23,6 @@ struct Slot {
     corners: [Given; 3],
     /// How often it was let through.
     passed: u8,
-    /// A third, fifth, ... copy: it goes with the next one, or is let through in the end.
-    waiting: Option<SoupTriangle>,
 }
 
 impl Slot {
@@ -52,12 +50,20 @@ pub struct LeftOut {
 pub(crate) struct CrowdFilter<'d> {
     domain: &'d Domain,
     slots: Vec<Slot>,
+    /// Of a slot that was let through twice, a third, fifth, ... copy: it goes with the next one, or is let
+    /// through in the end.
+    waiting: Vec<Option<SoupTriangle>>,
     left_out: LeftOut,
 }
 
 impl<'d> CrowdFilter<'d> {
     pub(crate) fn new(domain: &'d Domain) -> Self {
-        Self { domain, slots: vec![Slot::default(); SLOTS], left_out: LeftOut::default() }
+        Self {
+            domain,
+            slots: vec![Slot::default(); SLOTS],
+            waiting: vec![None; SLOTS],
+            left_out: LeftOut::default(),
+        }
     }
 
     /// Takes triangles out of the list, and may put in some that were taken out before; whether it did
@@ -68,22 +74,25 @@ impl<'d> CrowdFilter<'d> {
         triangles.retain(|triangle| {
             let corners = triangle.corners.map(given);
             let hash = corners.iter().fold(0_u64, |sum, corner| sum.wrapping_add(mix(corner)));
-            let slot = &mut self.slots[hash as usize % SLOTS];
+            let number = hash as usize % SLOTS;
+            let slot = &mut self.slots[number];
             if slot.passed == 0 || !slot.holds(hash, corners) {
-                overdue.extend(slot.waiting);
-                *slot = Slot { hash, corners, passed: 1, waiting: None };
+                if slot.passed == 2 {
+                    overdue.extend(self.waiting[number].take());
+                }
+                *slot = Slot { hash, corners, passed: 1 };
                 return true;
             }
             if slot.passed == 1 {
                 slot.passed = 2;
                 return true;
             }
-            if slot.waiting.take().is_some() {
+            if self.waiting[number].take().is_some() {
                 let is_degenerate = is_degenerate(snapped(self.domain, triangle));
                 self.left_out.triangles += 2;
                 self.left_out.degenerate_triangles += if is_degenerate { 2 } else { 0 };
             } else {
-                slot.waiting = Some(*triangle);
+                self.waiting[number] = Some(*triangle);
             }
             false
         });
@@ -94,7 +103,7 @@ impl<'d> CrowdFilter<'d> {
 
     /// The triangles that still wait.
     pub(crate) fn finish(&mut self) -> Vec<SoupTriangle> {
-        self.slots.iter_mut().filter_map(|slot| slot.waiting.take()).collect()
+        self.waiting.iter_mut().filter_map(Option::take).collect()
     }
 
     /// What was left out.

@@ -53,6 +53,18 @@ fn edges_of([p, q, r]: [Point; 3]) -> impl Iterator<Item = [Point; 2]> {
     [[p, q], [q, r], [p, r]].into_iter().filter(|[lower, upper]| lower != upper)
 }
 
+/// Two coordinates as one word, to be mixed.
+#[inline]
+fn word_of([low, high]: [u32; 2]) -> u64 {
+    u64::from(low) | u64::from(high) << 32
+}
+
+/// A hash of a triangle with ascending corners.
+#[inline]
+fn hash_of([[a, b, c], [d, e, f], [g, h, i]]: [Point; 3]) -> u64 {
+    mix(&[[a, b], [c, d], [e, f], [g, h], [i, 0]].map(word_of))
+}
+
 /// Tells whether any of the edges that were added came an odd number of times: those that came twice
 /// cancel out in the sums of their hashes. There are two of 64 bits, so that chance does not cancel any.
 #[derive(Default)]
@@ -60,10 +72,10 @@ struct Parity([u64; 2]);
 
 impl Parity {
     #[inline]
-    fn add(&mut self, ends: [Point; 2]) {
-        let [high, middle, low] = pack_ends(ends);
-        self.0[0] ^= mix(&[high, middle, low]);
-        self.0[1] ^= mix(&[low, high, middle]);
+    fn add(&mut self, [[a, b, c], [d, e, f]]: [Point; 2]) {
+        let [first, second, third] = [[a, b], [c, d], [e, f]].map(word_of);
+        self.0[0] ^= mix(&[first, second, third]);
+        self.0[1] ^= mix(&[third, first, second]);
     }
 
     fn has_odd(&self) -> bool {
@@ -112,7 +124,7 @@ impl Examiner<'_> {
             if owned.holds(corners[0]) && is_degenerate(corners) {
                 stats.degenerate_triangles += 1;
             }
-            has_copies |= !seen.insert(mix(&pack_corners(corners)));
+            has_copies |= !seen.insert(hash_of(corners));
             edges_of(corners).filter(|ends| owned.holds(ends[0])).for_each(|e| parity.add(e));
             Ok(())
         })?;

@@ -20,7 +20,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::geom::mix;
 use crate::ingest::charts::Charts;
 use crate::io::{IoError, Palette};
-use crate::octree::{AttributeRecord, CLOSES, SoupTriangle, TRANSPARENT};
+use crate::octree::{AttributeRecord, CLOSES, SoupSpool, SoupTriangle, TRANSPARENT};
 use crate::store::{
     Labels, Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError, Table,
 };
@@ -101,7 +101,7 @@ pub(super) fn no_looks(resources: &Resources) -> Result<Looks, StoreError> {
 /// Finds the looks of a soup with these materials.
 pub(super) fn find_looks(
     palette: &Palette,
-    (soup, attributes): (&Spool<SoupTriangle>, &Spool<AttributeRecord>),
+    (soup, attributes): (&SoupSpool, &Spool<AttributeRecord>),
     resources: &Resources,
 ) -> Result<Looks, IoError> {
     let mut is_mapped = mapped_materials(palette, resources)?;
@@ -141,7 +141,7 @@ fn material_of(triangle: &SoupTriangle) -> u32 {
 
 /// Visits the finite triangles with their numbers in the soup and their attributes.
 fn each_triangle(
-    soup: &Spool<SoupTriangle>,
+    soup: &SoupSpool,
     attributes: &Spool<AttributeRecord>,
     resources: &Resources,
     mut visit: impl FnMut(u32, &SoupTriangle, &AttributeRecord) -> Result<(), StoreError>,
@@ -276,7 +276,7 @@ fn part(
 
 /// Numbers the sets of triangles.
 fn number_looks(
-    soup: &Spool<SoupTriangle>,
+    soup: &SoupSpool,
     mut labels: Labels,
     is_mapped: &mut Table<u8>,
     resources: &Resources,

@@ -8,7 +8,7 @@ use crate::ingest::names::{PART_NAMES, write_materials, write_names};
 use crate::io::{IMAGES, IoError, MATERIALS, Palette};
 use crate::mesh::{Attributes, Discarded, LengthUnit, Material, MeshSource, TriangleBatch};
 use crate::monitor::Counter;
-use crate::octree::{AttributeRecord, SnapBox, SoupTriangle, TRANSPARENT};
+use crate::octree::{AttributeRecord, SnapBox, SoupSpool, SoupTriangle, SoupWriter, TRANSPARENT};
 use crate::store::{FileState, Resources, Spool, SpoolWriter, StoreError};
 
 /// Spool of the triangles.
@@ -71,7 +71,7 @@ impl SoupStats {
 /// The triangles of the input.
 pub struct Soup {
     /// Finite triangles in file order.
-    pub spool: Spool<SoupTriangle>,
+    pub spool: SoupSpool,
     /// Texture coordinates and colours, as far as the file has any that are wanted.
     pub attributes: Spool<AttributeRecord>,
     /// What parts them, or nothing.
@@ -94,7 +94,7 @@ impl Soup {
         facts: SoupFacts,
     ) -> Result<Self, StoreError> {
         Ok(Self {
-            spool: Spool::open(resources.scratch, FileState::find(files, SOUP)?)?,
+            spool: SoupSpool::open(resources.scratch, FileState::find(files, SOUP)?)?,
             attributes: Spool::open(resources.scratch, FileState::find(files, ATTRIBUTES)?)?,
             looks: Looks {
                 of_triangles: Spool::open(resources.scratch, FileState::find(files, LOOKS)?)?,
@@ -211,7 +211,7 @@ pub(super) fn has_materials<S: MeshSource + ?Sized>(
 }
 
 struct Writer {
-    spool: SpoolWriter<SoupTriangle>,
+    spool: SoupWriter,
     attributes: SpoolWriter<AttributeRecord>,
     wanted: Attributes,
     bounds: SnapBox,
@@ -226,7 +226,7 @@ struct Writer {
 impl Writer {
     fn new(wanted: Attributes, resources: &Resources) -> Result<Self, StoreError> {
         Ok(Self {
-            spool: SpoolWriter::create(resources.scratch, SOUP)?,
+            spool: SoupWriter::create(resources.scratch, SOUP)?,
             attributes: SpoolWriter::create(resources.scratch, ATTRIBUTES)?,
             wanted,
             bounds: SnapBox::EMPTY,

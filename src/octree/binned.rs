@@ -5,7 +5,7 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::Resident;
-use crate::octree::{BinTriangle, BrickKey, DropRecord, SoupTriangle};
+use crate::octree::{BinTriangle, BrickKey, DropRecord, SoupSpool, SoupTriangle, SoupWriter};
 use crate::store::{Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError};
 
 /// Triangles between two entries that are rather read in vain than passed over.
@@ -36,7 +36,7 @@ impl Record for BinEntry {
 #[derive(Clone, Copy)]
 pub struct BinSpools<'b> {
     /// The triangles, by source number within the entries of a brick.
-    pub triangles: &'b Spool<SoupTriangle>,
+    pub triangles: &'b SoupSpool,
     /// Where they lie, by ascending brick key and first triangle.
     pub entries: &'b Spool<BinEntry>,
 }
@@ -303,8 +303,8 @@ pub fn write_bins(
     sorter: Sorter<BinTriangle>,
     [triangles, entries]: [&str; 2],
     resources: &Resources,
-) -> Result<(Spool<SoupTriangle>, Spool<BinEntry>), StoreError> {
-    let mut triangles = SpoolWriter::create(resources.scratch, triangles)?;
+) -> Result<(SoupSpool, Spool<BinEntry>), StoreError> {
+    let mut triangles = SoupWriter::create(resources.scratch, triangles)?;
     let mut entries = SpoolWriter::create(resources.scratch, entries)?;
     let mut sorted = sorter.finish()?;
     let mut open: Option<BinEntry> = None;

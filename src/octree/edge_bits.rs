@@ -115,6 +115,17 @@ impl EdgeBits {
         }
     }
 
+    /// How many set edges the brick owns: those from corners below 32 along each axis.
+    #[must_use]
+    pub fn count_own(&self) -> u64 {
+        let own = CORNER_ROW >> 1;
+        let rows = (0..SIDE).flat_map(|z| (0..SIDE).map(move |y| z * LINES + y));
+        rows.map(|row| {
+            self.rows.iter().map(|rows| u64::from((rows[row] & own).count_ones())).sum::<u64>()
+        })
+        .sum()
+    }
+
     /// The cells of row (z, y), both below 32, that have at least one set edge: bit x per cell.
     #[must_use]
     #[inline]

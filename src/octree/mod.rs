@@ -20,6 +20,7 @@ mod plane;
 pub(crate) mod points;
 mod region;
 mod soup_edges;
+mod soup_spool;
 mod touch;
 mod triangle;
 
@@ -50,6 +51,7 @@ pub use occupancy::{InsideCorners, Occupancy};
 pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
 pub use soup_edges::{BorderUse, MOST_USES, Panes, SoupEdges, TrianglePair, each_border};
+pub use soup_spool::{NarrowTriangle, SoupReader, SoupSpool, SoupWriter};
 pub use touch::for_each_touched_brick;
 pub use triangle::{
     AttributeRecord, BinTriangle, CLOSES, DropRecord, SoupTriangle, TRANSPARENT, surface_of,

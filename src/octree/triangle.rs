@@ -17,7 +17,8 @@ pub const fn surface_of(material: u32) -> Surface {
     Surface::new(material & !(TRANSPARENT | CLOSES), material & CLOSES != 0)
 }
 
-/// A triangle of the soup, as spooled by ingest. 88 bytes; see docs/format.md.
+/// A triangle of the soup, as spooled by ingest. 88 bytes, and 48 on the disk where all are of single
+/// precision; see docs/format.md.
 #[derive(Clone, Copy, Debug, PartialEq, Pod, Zeroable)]
 #[repr(C)]
 pub struct SoupTriangle {

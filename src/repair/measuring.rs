@@ -10,11 +10,12 @@ use crate::deviate::{
 use crate::ingest::SOUP;
 use crate::io::{Format, IoError, ReadOptions};
 use crate::mesh::MeshSource;
+use crate::octree::SoupSpool;
 use crate::repair::RepairError;
 use crate::repair::run::Run;
 use crate::repair::stages::Findings;
 use crate::repair::workspace::Workspace;
-use crate::store::{FileState, Resources, Spool};
+use crate::store::{FileState, Resources};
 
 /// Samples of each surface: a share of a twentieth is told within a hundredth.
 pub const SAMPLES: u64 = 4000;
@@ -65,7 +66,7 @@ impl Run<'_> {
         let Resources { scratch, pool, monitor, .. } = *resources;
         let means = Means { scratch, pool, share_bytes: resources.share_bytes / 4 * 3, monitor };
         let asked = SurfaceOptions { samples: SAMPLES, creases: true };
-        let soup = Spool::open(scratch, soup)?;
+        let soup = SoupSpool::open(scratch, soup)?;
         let before = Surface::of_soup(&soup, &asked, &means)?;
         let after = Surface::read(file, &asked, &means).map_err(|error| match error {
             DeviateError::Source { source } => RepairError::ReadBack(source),

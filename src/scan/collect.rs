@@ -113,11 +113,15 @@ impl Collector {
             } else {
                 self.merge(None, start, count).push_to(&mut brick);
             }
-            self.count_owned(edge, count);
             start += count;
         }
         self.chunk.clear();
-        self.hand_over_planes(&mut brick);
+        if brick.hits.len() == self.sorted.len() {
+            // Planes are added with a hit, and all hits are kept.
+            brick.planes = std::mem::take(&mut self.planes);
+        } else {
+            self.hand_over_planes(&mut brick);
+        }
         brick
     }
 
@@ -154,7 +158,6 @@ impl Collector {
             }
             let earlier = before.next_if(|earlier| earlier.edge == edge);
             merged.push(self.merge(earlier, start, count));
-            self.count_owned(edge, count);
             start += count;
         }
         merged.extend(before);
@@ -168,14 +171,7 @@ impl Collector {
         self.chunk.clear();
     }
 
-    fn count_owned(&mut self, edge: u32, hits: usize) {
-        let (_, at) = edge_position(edge);
-        if at.iter().all(|&c| c < SIDE) {
-            self.owned_hits += hits as u64;
-        }
-    }
-
-    /// Counting sort by row, then by edge and plane within a row.
+    /// Counting sort by row, then by edge and plane within a row. Counts the hits on own edges.
     fn sort_chunk(&mut self) {
         self.rows.fill(0);
         for hit in &self.chunk {
@@ -192,10 +188,15 @@ impl Collector {
             *slot += 1;
         }
         let mut start = 0;
-        for &end in &self.rows[..ALL_ROWS] {
+        for (number, &end) in self.rows[..ALL_ROWS].iter().enumerate() {
             let row = &mut self.sorted[start as usize..end as usize];
             if row.len() > 1 {
                 row.sort_unstable_by_key(|hit| (hit.edge, hit.plane));
+            }
+            if number % LINES < SIDE && number / LINES % LINES < SIDE {
+                let last = (number * LINES + SIDE) as u32;
+                let beyond = row.iter().rev().take_while(|hit| hit.edge == last).count();
+                self.owned_hits += (row.len() - beyond) as u64;
             }
             start = end;
         }

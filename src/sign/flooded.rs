@@ -26,7 +26,9 @@ pub struct FloodedBrick {
     /// How many regions it has.
     pub regions: u32,
     /// 1 when its min corner is inside by parity, else 0.
-    pub base_inside: u32,
+    pub base_inside: u16,
+    /// 1 when no hit of it can be lost, if the outside reaches one of its regions and not the other; else 0.
+    pub is_parted: u16,
 }
 
 /// In a record of a region: the outside reaches it.
@@ -65,8 +67,14 @@ impl Flooded {
             if resources.monitor.cancelled() {
                 return Err(StoreError::Cancelled.into());
             }
-            let (count, base_inside) = (u32::from(brick.regions), u32::from(inside));
-            records.push(FloodedBrick { key: brick.key, regions: count, base_inside })?;
+            let (count, base_inside) = (u32::from(brick.regions), u16::from(inside));
+            let is_parted = u16::from(brick.is_parted);
+            records.push(FloodedBrick {
+                key: brick.key,
+                regions: count,
+                base_inside,
+                is_parted,
+            })?;
             for region in brick.first_region..brick.first_region + count {
                 let is_odd = match &mut odd {
                     Some(odd) => odd.next()? == Some(1),

@@ -15,6 +15,7 @@ use crate::octree::{
 use crate::sign::exterior::{Exterior, PastPanes, relabelled};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::panes::PanesSay;
+use crate::sign::thin::SPECK_EDGES;
 use crate::sign::winding::{Votes, Windings};
 use crate::sign::{FillRule, SignError};
 use crate::store::{
@@ -32,6 +33,8 @@ pub struct GraphBrick {
     pub regions: u16,
     /// Whether an odd number of marks lies on the x line through its min corner.
     pub odd_first_line: bool,
+    /// Whether no hit of it can be lost, if the outside reaches one of its regions and not the other.
+    pub is_parted: bool,
 }
 
 /// A piece of a face between two bricks, as one of them sees it.
@@ -90,6 +93,7 @@ struct BrickSays {
     brick: BrickKey,
     regions: u16,
     odd_first_line: bool,
+    is_parted: bool,
     sides: [FaceRegions; 6],
     even: Vec<[u16; 2]>,
     /// Regions at the lower and the upper end of edges, the change, and how many edges say so.
@@ -123,8 +127,8 @@ pub fn build_graph(
         |loaded, item| {
             let _brick = resident.hold(1);
             let view = loaded.load(hits, &item)?;
-            let mut says = examine(loaded, item.brick);
             let record = view.as_ref().map(|view| decode_hits(view)).transpose()?;
+            let mut says = examine(loaded, record, &item);
             if let (FillRule::Nonzero, Some(record)) = (rule, record) {
                 says.votes = votes_of(record, loaded, &item.flips);
             }
@@ -156,6 +160,7 @@ pub fn build_graph(
                 first_region: base,
                 regions: says.regions,
                 odd_first_line: says.odd_first_line,
+                is_parted: says.is_parted,
             });
             regions += u64::from(says.regions);
             resources.monitor.advance(1);
@@ -169,16 +174,23 @@ pub fn build_graph(
     Ok(RegionGraph { bricks, pieces, even, votes, panes, odd_regions: None, regions })
 }
 
-fn examine(loaded: &Loaded, brick: BrickKey) -> BrickSays {
+fn examine(loaded: &Loaded, record: Option<&ArchivedHitBrick>, item: &LoadItem) -> BrickSays {
     let regions = find_regions(&loaded.barrier);
     let sides =
         std::array::from_fn(|side| regions.on_side(&loaded.barrier, side / 2, side % 2 == 1));
+    let is_odd = loaded.barrier == loaded.marks;
+    // No face is odd where nothing was patched. If all edges that are hit are odd as well, parity changes
+    // there and nowhere else, so that their ends lie in both regions; and no speck has so many.
+    let hit_edges = record.map_or(0, |record| record.edges.len());
+    let is_parted =
+        is_odd && item.flips.is_empty() && regions.count == 2 && hit_edges > SPECK_EDGES;
     BrickSays {
-        brick,
+        brick: item.brick,
         regions: regions.count,
         odd_first_line: loaded.marks.rows(0)[0].count_ones() % 2 == 1,
+        is_parted,
         sides,
-        even: even_pairs(loaded, &regions),
+        even: if is_odd { Vec::new() } else { even_pairs(loaded, &regions) },
         votes: Vec::new(),
         panes: PanesSay::default(),
     }

@@ -171,7 +171,10 @@ impl Workspace {
     ) -> (SignBrick, SignStats) {
         self.marks.set_differences(&self.signs);
         let mut stats = self.count();
-        let mut brick = self.pick_crossings(record, flips, &mut stats);
+        let mut brick = match record.filter(|record| self.are_as_hit(record, flips)) {
+            Some(record) => self.take_hits(record, &mut stats),
+            None => self.pick_crossings(record, flips, &mut stats),
+        };
         brick.walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
         stats.walled_faces = brick.walls.len() as u64;
         (brick, stats)
@@ -194,6 +197,32 @@ impl Workspace {
             }
         }
         stats
+    }
+
+    /// Whether just those edges are marked that were hit, each once, and no patch is there.
+    fn are_as_hit(&self, record: &ArchivedHitBrick, flips: &[FlipRecord]) -> bool {
+        flips.is_empty() && record.hits.len() == record.edges.len() && {
+            self.loaded.barrier == self.marks
+        }
+    }
+
+    /// The crossings of a brick that is marked as it was hit: the same as [`Self::pick_crossings`] finds.
+    fn take_hits(&self, record: &ArchivedHitBrick, stats: &mut SignStats) -> SignBrick {
+        let hits = record.hits.iter().map(|hit| hit.to_native());
+        let crossings: Vec<Crossing> = record
+            .edges
+            .iter()
+            .map(|edge| HitEdge { bits: edge.bits.to_native(), signed_sum: 0 }.edge())
+            .zip(hits)
+            .map(|(edge, plane)| Crossing { edge, plane })
+            .collect();
+        stats.crossings = self.marks.count_own();
+        SignBrick {
+            base_inside: self.signs.get([0; 3]),
+            crossings,
+            planes: record.planes.iter().map(SourcePlane::from).collect(),
+            ..SignBrick::default()
+        }
     }
 
     /// One crossing for every marked edge: the one nearest to the outside.

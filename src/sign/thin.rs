@@ -24,7 +24,7 @@ const PARALLEL: f64 = 0.8;
 /// Corners of the largest speck.
 const SPECK_CORNERS: u32 = 8;
 /// Edges that leave a speck, at most.
-const SPECK_EDGES: usize = 6 * SPECK_CORNERS as usize;
+pub const SPECK_EDGES: usize = 6 * SPECK_CORNERS as usize;
 
 /// Finds the lost hits of all bricks.
 ///
@@ -41,19 +41,17 @@ pub fn find_lost(
     let mut lost = Sorter::new(resources.scratch, resources.share_bytes / 4);
     ordered_by_weight(
         resources.pool,
-        resources.scales(|(item, _): &(LoadItem, Vec<u8>)| item.weight_bytes(hits)),
+        resources.scales(|(item, ..): &(LoadItem, Vec<u8>, bool)| item.weight_bytes(hits)),
         || {
             let Some(load) = items.next()? else { return Ok(None) };
-            let (_, regions) = bricks.next_at(load.brick)?;
-            Ok(Some((load, regions)))
+            let (brick, regions) = bricks.next_at(load.brick)?;
+            Ok(Some((load, regions, brick.is_parted == 1)))
         },
         Loaded::default,
-        |loaded, (item, known)| {
-            // Nothing is lost where the outside does not come.
-            if known.iter().all(|region| region & OUTSIDE == 0) {
-                return Ok(Vec::new());
-            }
-            if is_parted_in_two(hits, &item, &known)? {
+        |loaded, (item, known, is_parted)| {
+            let outsides = known.iter().filter(|region| **region & OUTSIDE != 0).count();
+            // Nothing is lost where the outside does not come, nor in most bricks where it does.
+            if outsides == 0 || is_parted && outsides == 1 {
                 return Ok(Vec::new());
             }
             let Some(view) = loaded.load(hits, &item)? else { return Ok(Vec::new()) };
@@ -69,22 +67,6 @@ pub fn find_lost(
         |found: Vec<LostHits>| Ok::<(), SignError>(lost.extend(&found)?),
     )?;
     Ok(lost)
-}
-
-/// Whether a brick is surely one inside and one outside, with every hit between them: then nothing is lost,
-/// and no speck is that large. Most bricks are.
-fn is_parted_in_two(hits: &BrickFile, item: &LoadItem, known: &[u8]) -> Result<bool, SignError> {
-    let outsides = known.iter().filter(|region| **region & OUTSIDE != 0).count();
-    let Some(number) = item.hits.filter(|_| item.flips.is_empty()) else { return Ok(false) };
-    if (known.len(), outsides) != (2, 1) {
-        return Ok(false);
-    }
-    let view = hits.view(number)?;
-    let edges = &decode_hits(&view)?.edges;
-    // No face is odd where nothing was patched. If all classes are odd as well, parity changes where an
-    // edge is hit and nowhere else, so that the ends of such an edge lie in both regions.
-    let is_odd = |bits: u32| HitEdge { bits, signed_sum: 0 }.class() & 1 == 1;
-    Ok(edges.len() > SPECK_EDGES && edges.iter().all(|edge| is_odd(edge.bits.to_native())))
 }
 
 /// Which regions are specks: of few corners, all within the brick, with nothing inside beside them.

@@ -48,4 +48,4 @@ pub use texts::{NumberedTexts, Texts, TextsWriter};
 pub use unite::{Labels, Unite};
 
 /// Version of every file in a work folder; another version is discarded, never guessed at.
-pub const FORMAT_VERSION: u32 = 10;
+pub const FORMAT_VERSION: u32 = 11;

@@ -137,11 +137,8 @@ impl<R: Pod> Spool<R> {
     pub fn open(scratch: &Scratch, state: &FileState) -> Result<Self, StoreError> {
         let file = scratch.open(&state.name)?;
         let blocks = state.records.div_ceil(block_records::<R>() as u64);
-        let data_bytes = state.records.checked_mul(size_of::<R>() as u64);
-        let whole = data_bytes.and_then(|data| data.checked_add(HEADER_BYTES));
-        let whole = whole.and_then(|end| end.checked_add(blocks * DIGEST_BYTES as u64));
         let there = file.len_bytes()?;
-        if whole != Some(there) || there != state.len_bytes {
+        if Self::file_bytes(state.records) != Some(there) || there != state.len_bytes {
             let expected = format!("{} records of {} bytes", state.records, size_of::<R>());
             let found = format!("{there} bytes");
             return Err(StoreError::damaged(file.path(), there, expected, found));
@@ -164,6 +161,14 @@ impl<R: Pod> Spool<R> {
             return Err(StoreError::damaged(file.path(), offset, expected, "others"));
         }
         Ok(Self::new(file, state.clone(), digests))
+    }
+
+    /// The length of a spool of so many records; `None` where no file is as long.
+    #[must_use]
+    pub fn file_bytes(records: u64) -> Option<u64> {
+        let blocks = records.div_ceil(block_records::<R>() as u64);
+        let data_bytes = records.checked_mul(size_of::<R>() as u64)?;
+        data_bytes.checked_add(HEADER_BYTES + blocks * DIGEST_BYTES as u64)
     }
 
     /// How it is found again.

@@ -9,17 +9,18 @@
 //!             or two, as clusters have them. Where the two meet in a crease, no vertex of its cells wants
 //!             to be elsewhere for it (`block_creases`). So no feature is lost that its cells would keep.
 //! Units:      cells, from the brick's min corner.
-//! Memory:     20 bytes a crossing, with the leaves.
+//! Memory:     8 bytes a plane of the brick.
 //! Fails:      as for features.
 //! Source:     ours.
 
 use std::ops::RangeInclusive;
 
-use crate::contour::mdc::cell::{components_of, place_of};
-use crate::contour::mdc::cluster::{BlockPlace, Leaves, MOST_CELLS, PlaneHit, disk_in_block};
+use glam::DVec3;
+
+use crate::contour::mdc::cell::place_of;
+use crate::contour::mdc::cluster::{Block, BlockPlace, EdgeCounts, Group, disk_in_block};
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::plain::later;
-use crate::contour::mdc::table::AMBIGUOUS_FACES;
 use crate::contour::mdc::workspace::{EdgeCrossing, Workspace};
 use crate::contour::{ContourError, ContourStats, SurfaceDetail};
 use crate::octree::{CellBrick, LINES, ROWS, SIDE};
@@ -27,22 +28,65 @@ use crate::octree::{CellBrick, LINES, ROWS, SIDE};
 /// Blocks with fewer cells are left to these.
 const FEWEST_CELLS: u32 = 4;
 
-/// Edges that leave a block through its sides.
-const MOST_LEAVING: usize = 6 * (MOST_CELLS + 1) * (MOST_CELLS + 1);
-
-/// Numbers of the normals on edges that leave a block.
-struct Leaving {
-    numbers: [u32; MOST_LEAVING],
-    count: usize,
+/// The crossings of a block, plane by plane.
+#[derive(Default)]
+pub(super) struct BlockPlanes {
+    /// Which block this is: one more for every one.
+    block: u32,
+    /// Of every plane, by the number of its normal, the last block that has it and its rank there.
+    seen: Vec<[u32; 2]>,
+    /// The planes of the block.
+    own: Vec<Group>,
+    /// Numbers of the normals on edges that leave it, but for those that were own planes before.
+    leaving: Vec<u32>,
 }
 
-impl Leaving {
+/// In place of a rank: of a plane on edges that leave the block only.
+const LEAVES: u32 = u32::MAX;
+
+impl BlockPlanes {
+    /// Goes on with another block.
+    fn begin(&mut self) {
+        self.own.clear();
+        self.leaving.clear();
+        self.block = self.block.checked_add(1).unwrap_or_else(|| {
+            self.seen.fill([0; 2]);
+            1
+        });
+    }
+
+    /// Where it is noted that a plane was seen.
+    #[inline]
+    fn seen(&mut self, number: u32) -> &mut [u32; 2] {
+        let number = number as usize;
+        if number >= self.seen.len() {
+            self.seen.resize(number + 1, [0; 2]);
+        }
+        &mut self.seen[number]
+    }
+
+    /// Adds a crossing of the block.
+    #[inline]
+    fn add(&mut self, number: u32, point: DVec3) {
+        let (block, next) = (self.block, self.own.len() as u32);
+        let seen = self.seen(number);
+        let [last, mut rank] = *seen;
+        if last != block || rank == LEAVES {
+            rank = next;
+            *seen = [block, rank];
+            self.own.push(Group::of_plane(number - 1));
+        }
+        self.own[rank as usize].add_point(point);
+    }
+
+    /// Notes the plane of an edge that leaves the block.
     #[inline]
     fn note(&mut self, number: u32) {
-        // Neighbours are often of one triangle.
-        if self.count == 0 || self.numbers[self.count - 1] != number {
-            self.numbers[self.count] = number;
-            self.count += 1;
+        let block = self.block;
+        let seen = self.seen(number);
+        if seen[0] != block {
+            *seen = [block, LEAVES];
+            self.leaving.push(number);
         }
     }
 }
@@ -63,64 +107,53 @@ impl Workspace {
         if touched.count_ones() < FEWEST_CELLS
             || self.clustering.is_none()
             || brick.banned.binary_search(&block.packed()).is_ok()
-            || !self.are_single(block, touched)
         {
             return Ok(false);
         }
         let (low, side) = (place_of(block.first()), block.side());
         let Some(edges) = disk_in_block(&self.signs, low, side) else { return Ok(false) };
-        let first_hit = self.leaves.hits.len();
-        let mut leaves = std::mem::take(&mut self.leaves);
-        let made = self.gather(place, (low, side), &mut leaves)?.and_then(|leaving| {
-            let (hits, planes) = (&leaves.hits[first_hit..], &leaves.planes);
-            let clustering = self.clustering.as_ref()?;
-            let cosine_squared = clustering.cosine_squared();
-            let made = clustering.block(block, edges, hits, planes)?;
-            let are_along = leaving.numbers[..leaving.count]
-                .iter()
-                .all(|number| made.is_along(self.normals[*number as usize], cosine_squared));
-            let is_fine = are_along && self.keeps_crease((low, side), &made, planes);
-            is_fine.then_some(made)
-        });
+        let mut found = std::mem::take(&mut self.block_planes);
+        let is_one_surface = self.gather(place, (low, side), &mut found)?;
+        let made = if is_one_surface { self.judge_block(block, edges, &mut found) } else { None };
         let is_taken = made.is_some();
-        match made {
-            Some(made) => leaves.blocks.push(made),
-            None => leaves.hits.truncate(first_hit),
-        }
-        self.leaves = leaves;
-        if is_taken {
+        if let Some(made) = made {
+            let first_hit = self.leaves.hits.len();
+            self.leaves.hits.extend(found.own.iter().map(|group| group.to_hit()));
+            self.leaves.blocks.push(made);
             self.add_cells(block, touched, first_hit, brick);
             stats.cells += u64::from(touched.count_ones());
             stats.cell_vertices += u64::from(touched.count_ones());
         }
+        self.block_planes = found;
         Ok(is_taken)
     }
 
-    /// Whether the cells of a block have one piece of surface each, and no ambiguous faces.
-    fn are_single(&self, block: BlockPlace, touched: u64) -> bool {
-        let mut left = touched;
-        while left != 0 {
-            let at = place_of(block.first() | left.trailing_zeros() as usize);
-            left &= left - 1;
-            let mask = self.signs.cell_mask(at);
-            let is_single = AMBIGUOUS_FACES[usize::from(mask)] == 0
-                && components_of(u32::from(mask) << 15).count == 1;
-            if !is_single {
-                return false;
-            }
-        }
-        true
+    /// The block, if the planes that were found in it and on edges that leave it are those of one vertex.
+    fn judge_block(
+        &self,
+        block: BlockPlace,
+        edges: EdgeCounts,
+        found: &mut BlockPlanes,
+    ) -> Option<Block> {
+        let (clustering, planes) = (self.clustering.as_ref()?, &self.leaves.planes);
+        found.own.iter_mut().for_each(|group| group.close(planes));
+        let made = clustering.block(block, edges, &found.own, planes)?;
+        let cosine_squared = clustering.cosine_squared();
+        let is_along = |number: &u32| made.is_along(self.normals[*number as usize], cosine_squared);
+        let is_fine = found.leaving.iter().all(is_along)
+            && self.keeps_crease((place_of(block.first()), block.side()), &made, planes);
+        is_fine.then_some(made)
     }
 
-    /// Adds the crossings of the block from `low` to `leaves`, each once; the normals of those that leave the
-    /// block. `None` if one is of a patch, or not all are of one surface.
+    /// Finds the planes of the crossings of the block from `low`, and of those that leave it; whether none is
+    /// of a patch, and all are of one surface.
     fn gather(
         &mut self,
         place: Place,
         (low, side_cells): ([usize; 3], usize),
-        leaves: &mut Leaves,
-    ) -> Result<Option<Leaving>, ContourError> {
-        let mut leaving = Leaving { numbers: [0; MOST_LEAVING], count: 0 };
+        found: &mut BlockPlanes,
+    ) -> Result<bool, ContourError> {
+        found.begin();
         let mut surface = None;
         let has_surfaces = self.surfaces != SurfaceDetail::None;
         let all = self.each_crossing_of_block((low, side_cells), |axis, at, crossing, is_own| {
@@ -128,17 +161,17 @@ impl Workspace {
                 return false;
             }
             if !is_own {
-                leaving.note(crossing.normal);
+                found.note(crossing.normal);
                 return true;
             }
-            let mut point = at.map(|c| c as f32);
-            point[axis] = (at[axis] as f64 + crossing.offset) as f32;
-            leaves.hits.push(PlaneHit { plane: crossing.normal - 1, point });
+            let mut point = DVec3::from(at.map(|c| c as f64));
+            point[axis] += crossing.offset;
+            found.add(crossing.normal, point);
             let own = self.surfaces.of(crossing.surface);
             !has_surfaces || *surface.get_or_insert(own) == own
         });
         if !all {
-            return Ok(None);
+            return Ok(false);
         }
         for side in 0..6 {
             let axis = side / 2;
@@ -151,10 +184,10 @@ impl Workspace {
             let beyond = self.beyond(place, side)?;
             for row in low[v]..=low[v] + side_cells {
                 let numbers = &beyond[row * LINES + low[u]..][..=side_cells];
-                numbers.iter().filter(|number| **number != 0).for_each(|n| leaving.note(*n));
+                numbers.iter().filter(|number| **number != 0).for_each(|n| found.note(*n));
             }
         }
-        Ok(Some(leaving))
+        Ok(true)
     }
 
     /// Shows the crossings on the edges of the block from `low`, and on those of the brick that leave it, until

@@ -11,6 +11,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::contour::mdc::INSET_UNITS;
+use crate::contour::mdc::blocks::BlockPlanes;
 use crate::contour::mdc::cell::number_at;
 use crate::contour::mdc::cluster::{ClusterOptions, Clustering, Leaves};
 use crate::contour::mdc::features::Halo;
@@ -86,6 +87,7 @@ pub struct Workspace {
     pub(super) waiting: WaitingCells,
     pub(super) clustering: Option<Clustering>,
     pub(super) leaves: Leaves,
+    pub(super) block_planes: BlockPlanes,
     /// Cosine of the crease angle.
     pub(super) crease_cosine: f64,
     /// Whether no two planes of the brick differ by more than the crease angle.
@@ -132,6 +134,7 @@ impl Workspace {
             waiting: WaitingCells::default(),
             clustering: options.has_clusters().then(|| Clustering::new(cluster_options)),
             leaves: Leaves::default(),
+            block_planes: BlockPlanes::default(),
             // The cut-off is tan² of half the angle.
             crease_cosine: (1.0 - qef.cutoff()) / (1.0 + qef.cutoff()),
             is_smooth: false,

@@ -15,7 +15,9 @@ use glam::DVec3;
 
 use crate::contour::mdc::cluster::cut::Cut;
 use crate::contour::mdc::cluster::node::{EdgeCounts, Node};
-use crate::contour::mdc::cluster::planes::{CellPlane, Group, PlaneHit, one_or_two_groups};
+use crate::contour::mdc::cluster::planes::{
+    CellPlane, Group, largest_distance_of, one_or_two_groups,
+};
 use crate::contour::mdc::cluster::{Cell, Clustering};
 
 /// The largest level of a block, at which its cells are the bits of a word.
@@ -96,15 +98,15 @@ impl BlockPlace {
 }
 
 impl Clustering {
-    /// The block there, which crosses its edges so often, if these crossings have one vertex.
+    /// The block there, which crosses its edges so often, if its crossings, plane by plane, have one vertex.
     pub fn block(
         &self,
         place: BlockPlace,
         edges: EdgeCounts,
-        hits: &[PlaneHit],
+        of_planes: &[Group],
         planes: &[CellPlane],
     ) -> Option<Block> {
-        let (count, groups) = one_or_two_groups(hits, planes, self.cosine_squared)?;
+        let (count, groups) = one_or_two_groups(of_planes, planes, self.cosine_squared)?;
         let mut node = Node { groups: count as u32, ..Node::disk(edges) };
         for group in &groups[..count] {
             let (points, count) = group.crossings();
@@ -113,7 +115,12 @@ impl Clustering {
         }
         let cell = Cell { level: place.level, number: place.number, leaves: 0..0 };
         let vertex = self.vertex_of(&cell, &groups[..count], node.points / node.count, planes)?;
-        let error = self.error_of(vertex, hits, planes)?;
+        let error = largest_distance_of(
+            of_planes,
+            planes,
+            DVec3::from(vertex.map(f64::from)) / self.options.cell_units as f64,
+            self.options.threshold_cells,
+        )?;
         let directions = groups.map(|group| group.direction());
         Some(Block { place, node, groups, directions, vertex, error })
     }

@@ -1,9 +1,9 @@
 //! Whether the surface in a block of cells is one disk that meets each side of the block in one arc at most,
 //! told by the signs of the block's corners at once.
 //!
-//! In:         the corners of a block of at most [`MOST_CELLS`] cells a side, none of which has several pieces
-//!             of surface or an ambiguous face.
-//! Out:        how often it crosses the edges of the block, if it is such a disk.
+//! In:         the corners of a block of at most [`MOST_CELLS`] cells a side.
+//! Out:        how often it crosses the edges of the block, if it is such a disk, and no cell has several
+//!             pieces of it or an ambiguous face.
 //! Invariant:  the same as by joining the cells one after the other ([`Node::is_simple`]).
 //! Units:      counts.
 //! Memory:     none.
@@ -15,137 +15,189 @@ use crate::contour::mdc::cluster::node::{EdgeCounts, Node};
 use crate::contour::mdc::table::edge_at_corner;
 use crate::octree::{CornerBits, LINES};
 
-/// Most cells along a side of a block: its cells are the bits of a word.
-pub const MOST_CELLS: usize = 1 << BLOCK_LEVEL;
+/// Most cells along a side of a block.
+const MOST_CELLS: usize = 1 << BLOCK_LEVEL;
 /// Most corners along a side.
 const CORNERS: usize = MOST_CELLS + 1;
 
-/// The corners of a block, row by row: bits along x.
-struct Rows {
-    rows: [[u64; CORNERS]; CORNERS],
-    /// Cells along a side.
-    side: usize,
-    /// A bit for every cell of a row.
-    cells: u64,
-    /// The corners of a row that are not on a side of the block.
-    inner: u64,
+/// How far apart the bits of neighbours along each axis are: the corner at x, y, z is bit x + 5 y + 25 z, and
+/// so is the cell, the face or the edge from it.
+const STEPS: [usize; 3] = [1, CORNERS, CORNERS * CORNERS];
+
+/// The bits from `first` up to before `end` along each axis.
+const fn bits(first: [usize; 3], end: [usize; 3]) -> u128 {
+    let mut bits = 0;
+    let mut number = 0;
+    while number < CORNERS * CORNERS * CORNERS {
+        let mut is_in = true;
+        let mut axis = 0;
+        while axis < 3 {
+            let at = number / STEPS[axis] % CORNERS;
+            is_in = is_in && first[axis] <= at && at < end[axis];
+            axis += 1;
+        }
+        bits |= (is_in as u128) << number;
+        number += 1;
+    }
+    bits
 }
 
-/// Cells, and the inner faces through which the surface passes from them to the next along each axis; bit
-/// x + 4 y + 16 z.
-#[derive(Default)]
-struct Passed {
-    cells: u64,
-    faces: [u64; 3],
-    /// Inner edges that are crossed.
-    inner_edges: u32,
+/// What a block has, as bits.
+struct Places {
+    cells: u128,
+    /// Faces across each axis.
+    faces: [u128; 3],
+    /// Those between two cells.
+    inner_faces: [u128; 3],
+    /// Edges along each axis that lie on no side of the block.
+    inner_edges: [u128; 3],
+    /// Edges along each axis on the edge of the block from its min corner.
+    first_edges: [u128; 3],
+}
+
+const fn places(side: usize) -> Places {
+    let none = [0; 3];
+    let mut all = Places {
+        cells: bits([0; 3], [side; 3]),
+        faces: none,
+        inner_faces: none,
+        inner_edges: none,
+        first_edges: none,
+    };
+    let mut axis = 0;
+    while axis < 3 {
+        let (mut first, mut end) = ([0; 3], [side; 3]);
+        end[axis] = side + 1;
+        all.faces[axis] = bits(first, end);
+        (first[axis], end[axis]) = (1, side);
+        all.inner_faces[axis] = bits(first, end);
+        let mut first = [1; 3];
+        first[axis] = 0;
+        all.inner_edges[axis] = bits(first, [side; 3]);
+        let mut end = [1; 3];
+        end[axis] = side;
+        all.first_edges[axis] = bits([0; 3], end);
+        axis += 1;
+    }
+    all
+}
+
+/// Of blocks of two and of four cells a side.
+static PLACES: [Places; 2] = [places(MOST_CELLS / 2), places(MOST_CELLS)];
+
+/// The corners of a block.
+struct Block {
+    /// Those that are inside.
+    corners: u128,
+    /// Cells along a side.
+    side: usize,
+    places: &'static Places,
 }
 
 /// The crossings of the edges of the block of `side` cells from `low`, if the surface in it is one disk that
-/// meets each side of the block in one arc at most.
+/// meets each side of the block in one arc at most, and meets each cell and each face once at most.
 pub fn disk_in_block(signs: &CornerBits, low: [usize; 3], side: usize) -> Option<EdgeCounts> {
-    let rows = Rows::of(signs, low, side);
-    let edges = rows.block_edges();
-    if !Node::disk(edges).is_simple() {
-        return None;
-    }
-    let passed = Passed::of(&rows);
-    let faces: u32 = passed.faces.iter().map(|faces| faces.count_ones()).sum();
-    // Every cell has a disk, disks share the arcs on inner faces, and these the crossings of inner edges.
-    let euler = (passed.cells.count_ones() + passed.inner_edges) as i32 - faces as i32;
-    (euler == 1 && passed.is_connected()).then_some(edges)
+    let block = Block::of(signs, low, side);
+    let edges = block.edges();
+    let is_simple = Node::disk(edges).is_simple() && !block.meets_any_twice();
+    (is_simple && block.is_disk()).then_some(edges)
 }
 
-impl Rows {
+impl Block {
     fn of(signs: &CornerBits, low: [usize; 3], side: usize) -> Self {
-        let mut rows = [[0; CORNERS]; CORNERS];
-        let corners = (1 << (side + 1)) - 1;
-        for (z, plane) in rows[..=side].iter_mut().enumerate() {
-            for (y, row) in plane[..=side].iter_mut().enumerate() {
-                *row = signs.rows[(low[2] + z) * LINES + low[1] + y] >> low[0] & corners;
-            }
+        let of_row = (1 << (side + 1)) - 1;
+        let mut corners = 0;
+        for z in 0..=side {
+            let first = (low[2] + z) * LINES + low[1];
+            let rows = &signs.rows[first..=first + side];
+            let plane =
+                rows.iter().rev().fold(0, |plane, row| plane << STEPS[1] | row >> low[0] & of_row);
+            corners |= u128::from(plane) << (STEPS[2] * z);
         }
-        let cells = (1 << side) - 1;
-        Self { rows, side, cells, inner: cells & !1 }
+        Self { corners, side, places: &PLACES[usize::from(side == MOST_CELLS)] }
     }
 
     /// How often the edges of the block are crossed.
-    fn block_edges(&self) -> EdgeCounts {
-        let (rows, side) = (&self.rows, self.side);
+    fn edges(&self) -> EdgeCounts {
         let mut edges = EdgeCounts::default();
-        let mut add = |axis: u8, corner: u8, count: u64| {
-            edges.add_to(edge_at_corner(corner, axis), count);
-        };
-        for high_z in [0, 1] {
-            for high_y in [0, 1] {
-                let row = rows[side * usize::from(high_z)][side * usize::from(high_y)];
-                let crossed = (row ^ row >> 1) & self.cells;
-                add(0, high_y << 1 | high_z << 2, u64::from(crossed.count_ones()));
-            }
-        }
-        for high in [0, 1] {
-            let at = side * usize::from(high);
-            for step in 0..side {
-                let along_y = rows[at][step] ^ rows[at][step + 1];
-                add(1, high << 2, along_y & 1);
-                add(1, 1 | high << 2, along_y >> side & 1);
-                let along_z = rows[step][at] ^ rows[step + 1][at];
-                add(2, high << 1, along_z & 1);
-                add(2, 1 | high << 1, along_z >> side & 1);
+        for (axis, step) in STEPS.into_iter().enumerate() {
+            let crossed = self.corners ^ self.corners >> step;
+            let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+            for ends in 0..4 {
+                let [high_u, high_v] = [ends & 1, ends >> 1];
+                let start = self.side * (high_u * STEPS[u] + high_v * STEPS[v]);
+                let along = crossed >> start & self.places.first_edges[axis];
+                // Seldom more than one.
+                let count = match along & along.wrapping_sub(1) {
+                    0 => u64::from(along != 0),
+                    _ => u64::from(along.count_ones()),
+                };
+                let corner = high_u << u | high_v << v;
+                edges.add_to(edge_at_corner(corner as u8, axis as u8), count);
             }
         }
         edges
     }
 
-    /// The faces between two rows of corners that have both signs.
-    fn mixed(&self, one: u64, other: u64) -> u64 {
-        let (all, any) = (one & other, one | other);
-        (any | any >> 1) & !(all & all >> 1) & self.cells
+    /// Whether a face is ambiguous, or a cell has two pieces all the same: then two corners across from each
+    /// other are alone on their side.
+    fn meets_any_twice(&self) -> bool {
+        let c = self.corners;
+        let ambiguous = (0..3).map(|axis| {
+            let [u, v] = [STEPS[(axis + 1) % 3], STEPS[(axis + 2) % 3]];
+            (c ^ c >> u) & (c ^ c >> v) & !(c ^ c >> (u + v)) & self.places.faces[axis]
+        });
+        let ambiguous = ambiguous.fold(0, |all, faces| all | faces);
+        let of_cell: [u128; 8] = std::array::from_fn(|corner| {
+            c >> (0..3).map(|a| (corner >> a & 1) * STEPS[a]).sum::<usize>()
+        });
+        let pairs: [[u128; 2]; 4] = std::array::from_fn(|i| [of_cell[i], of_cell[7 - i]]);
+        let apart = (0..4).map(|one| {
+            let others = (0..4).filter(|other| *other != one).map(|other| pairs[other]);
+            let (any, all) = others.fold((0, !0), |(any, all), [a, b]| (any | a | b, all & a & b));
+            let [a, b] = pairs[one];
+            a & b & !any | !(a | b) & all
+        });
+        let apart = apart.fold(0, |all, cells| all | cells);
+        (ambiguous | apart & self.places.cells) != 0
+    }
+
+    /// The places from which, a step along some axes, corners of both signs are reached.
+    fn mixed(&self, axes: &[usize]) -> u128 {
+        let (mut any, mut all) = (self.corners, self.corners);
+        for axis in axes {
+            any |= any >> STEPS[*axis];
+            all &= all >> STEPS[*axis];
+        }
+        any & !all
+    }
+
+    /// Whether the surface is one disk, if it is one in each of its cells.
+    fn is_disk(&self) -> bool {
+        let places = self.places;
+        let cells = self.mixed(&[0, 1, 2]) & places.cells;
+        let faces = [[1, 2], [2, 0], [0, 1]].map(|axes| self.mixed(&axes));
+        let faces = [0, 1, 2].map(|axis| faces[axis] & places.inner_faces[axis]);
+        let inner_edges: u32 =
+            (0..3).map(|axis| (self.mixed(&[axis]) & places.inner_edges[axis]).count_ones()).sum();
+        let inner_faces: u32 = faces.iter().map(|faces| faces.count_ones()).sum();
+        // Every cell has a disk, disks share the arcs on inner faces, and these the crossings of inner edges.
+        let euler = (cells.count_ones() + inner_edges) as i32 - inner_faces as i32;
+        euler == 1 && is_connected(cells, faces)
     }
 }
 
-impl Passed {
-    fn of(block: &Rows) -> Self {
-        let (rows, side) = (&block.rows, block.side);
-        let mut passed = Self::default();
-        for z in 0..side {
-            for y in 0..side {
-                let [a, b, c, d] = [rows[z][y], rows[z][y + 1], rows[z + 1][y], rows[z + 1][y + 1]];
-                let at = 4 * y + 16 * z;
-                let (all, any) = (a & b & c & d, a | b | c | d);
-                passed.faces[0] |= ((any & !all & block.inner) >> 1) << at;
-                let (all, any) = (all & all >> 1, any | any >> 1);
-                passed.cells |= (any & !all & block.cells) << at;
-                let (is_last_y, is_last_z) = (y + 1 == side, z + 1 == side);
-                if !is_last_y {
-                    passed.faces[1] |= block.mixed(b, d) << at;
-                    passed.inner_edges += ((b ^ d) & block.inner).count_ones();
-                }
-                if !is_last_z {
-                    passed.faces[2] |= block.mixed(c, d) << at;
-                    passed.inner_edges += ((c ^ d) & block.inner).count_ones();
-                }
-                if !is_last_y && !is_last_z {
-                    passed.inner_edges += ((d ^ d >> 1) & block.cells).count_ones();
-                }
-            }
+/// Whether all cells are reached from one of them through these faces.
+fn is_connected(cells: u128, faces: [u128; 3]) -> bool {
+    let mut reached = cells & cells.wrapping_neg();
+    loop {
+        let mut next = reached;
+        for (faces, step) in faces.into_iter().zip(STEPS) {
+            next |= (next << step) & faces | (next & faces) >> step;
         }
-        passed
-    }
-
-    /// Whether all cells are reached from one of them through faces.
-    fn is_connected(&self) -> bool {
-        let [x, y, z] = self.faces;
-        let mut reached = self.cells & self.cells.wrapping_neg();
-        loop {
-            let mut next = reached;
-            next |= (next & x) << 1 | next >> 1 & x;
-            next |= (next & y) << 4 | next >> 4 & y;
-            next |= (next & z) << 16 | next >> 16 & z;
-            if next == reached {
-                return reached == self.cells;
-            }
-            reached = next;
+        if next == reached {
+            return reached == cells;
         }
+        reached = next;
     }
 }

@@ -29,8 +29,9 @@ use std::ops::Range;
 use glam::DVec3;
 
 pub use block::{BLOCK_LEVEL, Block, BlockPlace};
-pub use disk::{MOST_CELLS, disk_in_block};
-pub use planes::{CellPlane, JUDGES_ONLY, PlaneHit};
+pub use disk::disk_in_block;
+pub use node::EdgeCounts;
+pub use planes::{CellPlane, Group, JUDGES_ONLY, PlaneHit};
 pub use summary::{Part, join};
 
 use crate::contour::mdc::cell::{
@@ -39,7 +40,7 @@ use crate::contour::mdc::cell::{
 use crate::contour::mdc::cluster::corners::Corners;
 use crate::contour::mdc::cluster::cut::Cut;
 use crate::contour::mdc::cluster::node::Node;
-use crate::contour::mdc::cluster::planes::{Group, add_group, add_hit};
+use crate::contour::mdc::cluster::planes::{add_group, add_hit};
 use crate::contour::mdc::table::AMBIGUOUS_FACES;
 use crate::geom::qef::QefOptions;
 use crate::octree::{CellBrick, MAX_LEVEL, SIDE};
@@ -69,7 +70,7 @@ pub struct Leaves {
     pub components: Vec<u32>,
     /// First hit of every component, and their total.
     pub hit_starts: Vec<u32>,
-    /// Crossings, component after component; of a block each once, at its first component.
+    /// Crossings, component after component; of a block one for each plane, at its first component.
     pub hits: Vec<PlaneHit>,
     /// Blocks of cells that are one vertex.
     pub blocks: Vec<Block>,

@@ -33,7 +33,16 @@ pub struct CellPlane {
     pub offset: f64,
 }
 
-/// A crossing of a leaf cell: where, and on which plane of the brick.
+impl CellPlane {
+    /// How far a point is from it.
+    #[inline]
+    fn distance(&self, point: DVec3) -> f64 {
+        (self.normal.dot(point) - self.offset).abs()
+    }
+}
+
+/// A crossing of a leaf cell, or the middle of those of a block on one plane: where, and on which plane of the
+/// brick.
 #[derive(Clone, Copy, Debug)]
 pub struct PlaneHit {
     /// Number of the plane, and perhaps [`JUDGES_ONLY`].
@@ -52,6 +61,32 @@ pub struct Group {
 }
 
 impl Group {
+    /// The crossings of one plane, none yet.
+    #[inline]
+    pub fn of_plane(plane: u32) -> Self {
+        Self { normals: DVec3::ZERO, points: DVec3::ZERO, count: 0.0, plane }
+    }
+
+    /// Adds a crossing of the plane of [`Self::of_plane`].
+    #[inline]
+    pub fn add_point(&mut self, point: DVec3) {
+        self.points += point;
+        self.count += 1.0;
+    }
+
+    /// All crossings of the plane are added.
+    #[inline]
+    pub fn close(&mut self, planes: &[CellPlane]) {
+        self.normals = planes[self.plane as usize].normal * self.count;
+    }
+
+    /// Its plane at the mean of its crossings.
+    #[inline]
+    pub fn to_hit(self) -> PlaneHit {
+        let point = (self.points / self.count).as_vec3().to_array();
+        PlaneHit { plane: self.plane, point }
+    }
+
     /// A group of one crossing.
     pub fn of(hit: &PlaneHit, planes: &[CellPlane]) -> Self {
         let normals = planes[hit.plane as usize].normal;
@@ -162,22 +197,23 @@ pub fn add_hit(
     add_group(groups, from, &Group::of(hit, planes), planes, cosine_squared)
 }
 
-/// The groups of these crossings, if they are no more than two; both are the first where they are one.
+/// The groups that the crossings of these planes make, if they are no more than two; both are the first where
+/// they are one.
 pub fn one_or_two_groups(
-    hits: &[PlaneHit],
+    of_planes: &[Group],
     planes: &[CellPlane],
     cosine_squared: f64,
 ) -> Option<(usize, [Group; 2])> {
-    let mut groups = [Group::of(hits.first()?, planes); 2];
+    let mut groups = [*of_planes.first()?; 2];
     let mut count = 1;
-    for hit in &hits[1..] {
-        if groups[0].take_in_hit(hit, planes, cosine_squared) {
+    for one in &of_planes[1..] {
+        if groups[0].take_in(one, planes, cosine_squared) {
             continue;
         }
         if count == 1 {
-            groups[1] = Group::of(hit, planes);
+            groups[1] = *one;
             count = 2;
-        } else if !groups[1].take_in_hit(hit, planes, cosine_squared) {
+        } else if !groups[1].take_in(one, planes, cosine_squared) {
             return None;
         }
     }
@@ -218,6 +254,23 @@ pub fn place(
     solve(&hits[..groups.len().max(1)], options)
 }
 
+/// The largest distance of `vertex` to the planes of these groups, each of one plane; `None` if one is beyond
+/// the threshold.
+#[inline]
+pub fn largest_distance_of(
+    of_planes: &[Group],
+    planes: &[CellPlane],
+    vertex: DVec3,
+    threshold: f64,
+) -> Option<f64> {
+    let largest = of_planes.iter().fold(0.0, |largest, group| {
+        let distance = planes[group.plane as usize].distance(vertex);
+        // Not a number is no distance; the method for that takes longer.
+        if distance > largest { distance } else { largest }
+    });
+    (largest <= threshold).then_some(largest)
+}
+
 /// The largest distance of `vertex` to the planes of `hits`; `None` if one is beyond the threshold.
 #[inline]
 pub fn largest_distance(
@@ -230,7 +283,7 @@ pub fn largest_distance(
     for some in hits.chunks(JUDGED_TOGETHER) {
         for hit in some {
             let plane = &planes[(hit.plane & !JUDGES_ONLY) as usize];
-            let distance = (plane.normal.dot(vertex) - plane.offset).abs();
+            let distance = plane.distance(vertex);
             // Not a number is no distance; the method for that takes longer.
             largest = if distance > largest { distance } else { largest };
         }
