@@ -5,7 +5,7 @@ mod support;
 use brickmend::contour::{ContourOptions, ContourStats, Method, SurfaceDetail, write_surface};
 use brickmend::io::{Format, WriteOptions, create};
 use brickmend::mesh::MeshSink;
-use brickmend::octree::Domain;
+use brickmend::octree::{Domain, SignBricks};
 use brickmend::store::{BrickFile, Resources};
 use criterion::{Criterion, Throughput, criterion_group, criterion_main};
 use std::hint::black_box;
@@ -45,15 +45,16 @@ fn contours(criterion: &mut Criterion) {
         let (hits, _) = workshop.scan(&model);
         let flips = workshop.patch(&model, &hits);
         let (signs, stats) = workshop.sign(&model, &hits, &flips);
-        let (cells, placed) = workshop.place(&model, &signs, &LEAVES);
-        let surface = workshop.separate(&model, &signs, &cells, &LEAVES, &placed);
+        let signs = SignBricks::new(&signs, &hits);
+        let (cells, placed) = workshop.place(&model, signs, &LEAVES);
+        let surface = workshop.separate(&model, signs, &cells, &LEAVES, &placed);
         let files = (&cells, &surface);
         group.throughput(Throughput::Elements(stats.leaf_cells));
         group.bench_function(format!("{name} vertices"), |bencher| {
-            bencher.iter(|| black_box(workshop.place(&model, &signs, &LEAVES)));
+            bencher.iter(|| black_box(workshop.place(&model, signs, &LEAVES)));
         });
         group.bench_function(format!("{name} clusters"), |bencher| {
-            bencher.iter(|| black_box(workshop.place(&model, &signs, &CLUSTERS)));
+            bencher.iter(|| black_box(workshop.place(&model, signs, &CLUSTERS)));
         });
         group.bench_function(format!("{name} polygons"), |bencher| {
             bencher.iter(|| write(files, &model.domain, &mut Nowhere::default(), &resources));

@@ -11,7 +11,7 @@ use brickmend::mesh::shapes::{
 };
 use brickmend::mesh::{Attributes, MeshSink, SinkState, SinkStats, SinkTriangles};
 use brickmend::monitor::Void;
-use brickmend::octree::{Domain, Flips};
+use brickmend::octree::{Domain, Flips, SignBricks};
 use brickmend::patch::patch;
 use brickmend::scan::{HAS_ODD_FACES, ScanStats, scan};
 use brickmend::sign::{FillRule, SignStats, assign_signs, flood};
@@ -113,7 +113,7 @@ impl Workshop {
     pub fn place(
         &self,
         model: &Ingested,
-        signs: &BrickFile,
+        signs: SignBricks,
         options: &ContourOptions,
     ) -> (BrickFile, ContourStats) {
         place_vertices(signs, &model.domain, options, &self.resources()).expect("contour works")
@@ -122,7 +122,7 @@ impl Workshop {
     pub fn separate(
         &self,
         model: &Ingested,
-        signs: &BrickFile,
+        signs: SignBricks,
         cells: &BrickFile,
         options: &ContourOptions,
         placed: &ContourStats,

@@ -31,7 +31,7 @@ mod write;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::Surface;
-use crate::octree::{BrickError, Domain};
+use crate::octree::{BrickError, Domain, SignBrickError, SignBricks};
 use crate::store::{BrickFile, BrickWriter, Resources, StoreError};
 
 pub use count::count_triangles;
@@ -147,6 +147,9 @@ pub enum ContourError {
     /// A brick's record is not what its stage writes.
     #[error(transparent)]
     Brick(#[from] BrickError),
+    /// A brick of signs cannot be read.
+    #[error(transparent)]
+    Signs(SignBrickError),
     /// Two bricks contradict each other: a bug, or a disk that lies.
     #[error("Brick {brick:?}: expected {expected}, found otherwise")]
     Contradiction {
@@ -155,6 +158,16 @@ pub enum ContourError {
         /// What holds for every sound set of bricks.
         expected: &'static str,
     },
+}
+
+impl From<SignBrickError> for ContourError {
+    fn from(error: SignBrickError) -> Self {
+        match error {
+            SignBrickError::Store(error) => Self::Store(error),
+            SignBrickError::Brick(error) => Self::Brick(error),
+            other => Self::Signs(other),
+        }
+    }
 }
 
 impl ContourError {
@@ -278,7 +291,7 @@ impl ContourStats {
 /// # Errors
 /// [`ContourError`].
 pub fn place_vertices(
-    signs: &BrickFile,
+    signs: SignBricks,
     domain: &Domain,
     options: &ContourOptions,
     resources: &Resources,
@@ -299,7 +312,7 @@ pub fn place_vertices(
 /// # Errors
 /// [`ContourError`].
 pub fn separate(
-    signs: &BrickFile,
+    signs: SignBricks,
     cells: &BrickFile,
     domain: &Domain,
     options: &ContourOptions,

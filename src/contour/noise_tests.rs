@@ -15,8 +15,8 @@ use crate::mesh::shapes::{ListedTriangles, Random};
 use crate::mesh::{MeshSink, SinkState, SinkStats, SinkTriangles};
 use crate::monitor::Void;
 use crate::octree::{
-    BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SnapBox,
-    SourcePlane, decode_cells, edge_position, encode, face_index, for_each_ambiguous_face,
+    BrickKey, CornerBits, Crossing, Domain, EdgeBits, LINES, PATCH, SIDE, SignBrick, SignBricks,
+    SnapBox, SourcePlane, decode_cells, edge_position, encode, face_index, for_each_ambiguous_face,
 };
 use crate::store::{Backing, BrickFile, BrickWriter, NoCheckpoints, Resources, Scratch};
 use crate::verify::{Outward, Proof, ProofOptions, ProvedSource, Vertices, prove};
@@ -209,10 +209,10 @@ pub fn contour_bricks(
         writer.append(key, 0, &encode(&brick)).expect("room");
     }
     let signs = writer.finish(2).expect("room");
-    let (cells, placed) =
-        place_vertices(&signs, domain, options, &resources).expect("sound bricks");
+    let signs = SignBricks::whole(&signs);
+    let (cells, placed) = place_vertices(signs, domain, options, &resources).expect("sound bricks");
     let (surface, separated) =
-        separate(&signs, &cells, domain, options, &placed, &resources).expect("sound bricks");
+        separate(signs, &cells, domain, options, &placed, &resources).expect("sound bricks");
     if method != Method::Mc {
         for file in [&cells, &surface] {
             assert_vertices_lie_in_their_cells(file, domain);

@@ -10,9 +10,9 @@
 use crate::contour::{
     CELLS, ContourError, ContourOptions, SURFACE, count_triangles, place_vertices, separate,
 };
-use crate::octree::Domain;
+use crate::octree::{Domain, SignBricks};
 use crate::repair::RepairError;
-use crate::store::{BrickFile, NoCheckpoints, Resources, StoreError, directory_name};
+use crate::store::{NoCheckpoints, Resources, StoreError, directory_name};
 
 /// Larger thresholds are not tried: a cluster is no larger than a brick.
 const LAST_CELLS: f64 = 1000.0;
@@ -38,7 +38,7 @@ pub fn most_trials(from_cells: f64) -> u64 {
 
 /// The surfaces of one set of signs.
 pub struct Trials<'t> {
-    pub signs: &'t BrickFile,
+    pub signs: SignBricks<'t>,
     pub domain: &'t Domain,
     /// All but the threshold.
     pub options: ContourOptions,

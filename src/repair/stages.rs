@@ -16,7 +16,7 @@ use crate::ingest::{
 use crate::io::{IoError, ReadOptions};
 use crate::mesh::{LengthUnit, MeshSource, SinkFile, SinkStats};
 use crate::monitor::Monitor;
-use crate::octree::{Domain, Flips};
+use crate::octree::{Domain, Flips, SignBricks};
 use crate::patch::{PatchStats, patch};
 use crate::repair::RepairError;
 use crate::repair::choose::{Trials, most_trials};
@@ -139,6 +139,17 @@ pub(crate) fn open_bricks<'h>(
             Ok(held.insert(file))
         }
     }
+}
+
+/// The bricks of signs with the hits that they come from, in `held` or as an earlier run left them.
+pub(crate) fn open_signs<'h>(
+    [hits, signs]: [&'h mut Option<BrickFile>; 2],
+    workspace: &Workspace,
+    resources: &Resources,
+) -> Result<SignBricks<'h>, StoreError> {
+    let hits = open_bricks(hits, HITS, workspace, resources)?;
+    let signs = open_bricks(signs, SIGNS, workspace, resources)?;
+    Ok(SignBricks::new(signs, hits))
 }
 
 /// The bins in `held`, or those that an earlier run left.
@@ -330,7 +341,7 @@ impl Run<'_> {
         let (signs, stats) = assign_signs((hits, Some(borders)), &flips, &flooded, rule, resources)
             .map_err(RepairError::Sign)?;
         findings.sign = stats;
-        (handles.hits, handles.borders) = (None, None);
+        handles.borders = None;
         if stats.crossings == 0 {
             return Err(self.empty_result(findings));
         }
@@ -380,7 +391,8 @@ impl Run<'_> {
     ) -> Result<Vec<FileState>, RepairError> {
         findings.raised_cells = None;
         if let Some(limit) = self.settings.max_triangles {
-            let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
+            let files = [&mut handles.hits, &mut handles.signs];
+            let signs = open_signs(files, workspace, resources)?;
             let (domain, options) = (findings.domain(), self.contour_options(findings));
             let trials = Trials { signs, domain, options, resources: *resources };
             findings.raised_cells = Some(trials.choose(limit)?);
@@ -395,7 +407,7 @@ impl Run<'_> {
         handles: &mut Handles,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
+        let signs = open_signs([&mut handles.hits, &mut handles.signs], workspace, resources)?;
         let (cells, stats) =
             place_vertices(signs, findings.domain(), &self.contour_options(findings), resources)
                 .map_err(RepairError::Contour)?;
@@ -410,7 +422,7 @@ impl Run<'_> {
         handles: &mut Handles,
         resources: &Resources,
     ) -> Result<Vec<FileState>, RepairError> {
-        let signs = open_bricks(&mut handles.signs, SIGNS, workspace, resources)?;
+        let signs = open_signs([&mut handles.hits, &mut handles.signs], workspace, resources)?;
         let cells = open_bricks(&mut handles.cells, CELLS, workspace, resources)?;
         let (domain, options) = (findings.domain(), self.contour_options(findings));
         let (surface, stats) =
@@ -419,7 +431,9 @@ impl Run<'_> {
         (findings.placed, findings.contour) = (stats, stats);
         // Another level opens them again, unless they are in memory only.
         let more = self.has_more_levels(findings);
-        handles.signs.take_if(|signs| !more || signs.state().is_some());
+        for file in [&mut handles.hits, &mut handles.signs] {
+            file.take_if(|file| !more || file.state().is_some());
+        }
         Ok(hand_on(surface, &mut handles.surface))
     }
 }

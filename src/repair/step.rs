@@ -166,9 +166,9 @@ impl Step {
             ],
             Self::Sign => &[HITS, FLIPS, FLOODED, REGIONS, BORDERS],
             // With what later steps of every level read that is there by now.
-            Self::Choose => &[SIGNS, SOUP, ATTRIBUTES, ORIGINS, SLAB_ORIGINS],
-            Self::Place => &[SIGNS],
-            Self::Separate => &[SIGNS, CELLS],
+            Self::Choose => &[HITS, SIGNS, SOUP, ATTRIBUTES, ORIGINS, SLAB_ORIGINS],
+            Self::Place => &[HITS, SIGNS],
+            Self::Separate => &[HITS, SIGNS, CELLS],
             Self::Draw => &[CELLS, SURFACE, ORIGINS, SLAB_ORIGINS],
             Self::Write => &[
                 CELLS,
@@ -235,9 +235,11 @@ mod tests {
         assert!(Step::Scan.still_needs(BINS));
         assert!(Step::Patch.still_needs(BINS), "what is thickened is scanned again");
         assert!(!Step::Sign.still_needs(BINS));
-        assert!(Step::Sign.still_needs(HITS));
-        assert!(Step::Choose.still_needs(HITS));
-        assert!(!Step::Place.still_needs(HITS));
+        assert!(Step::Sign.still_needs(FLIPS));
+        assert!(Step::Choose.still_needs(FLIPS));
+        assert!(!Step::Place.still_needs(FLIPS));
+        assert!(Step::Separate.still_needs(HITS), "most signs are told by them");
+        assert!(!Step::Draw.still_needs(HITS));
         assert!(Step::Prove.still_needs(OUTPUT_PART));
     }
 

@@ -20,6 +20,8 @@ const FILTER: f64 = 1.0 / (1_u64 << 46) as f64;
 pub struct Converter {
     domain: Domain,
     cell: i64,
+    /// About 1 / cell: a product takes less than a quotient.
+    cells_per_unit: f64,
     base: [i64; 3],
 }
 
@@ -42,7 +44,8 @@ struct Extent {
 
 impl Converter {
     pub fn new(domain: &Domain) -> Self {
-        Self { domain: *domain, cell: i64::from(domain.cell_units), base: [0; 3] }
+        let cell = i64::from(domain.cell_units);
+        Self { domain: *domain, cell, cells_per_unit: 1.0 / cell as f64, base: [0; 3] }
     }
 
     /// Goes on with another brick.
@@ -111,16 +114,22 @@ impl Converter {
             return;
         }
         let sides = Sides::new(triangle, axis);
+        let step = sides.direction.map(|[_, dv]| dv * self.cell);
+        let per_normal = 1.0 / triangle.normal[axis] as f64;
         for j in first_v..=last_v {
             let line_v = j * self.cell;
             let (from, to) = sides.span(line_v, first_u, last_u, self.cell);
+            let mut values = sides.values(from * self.cell, line_v);
             for i in from..=to {
-                let line_u = i * self.cell;
-                if sides.contain(line_u, line_v)
-                    && let Some(place) = self.place_along(triangle, axis, line_u, line_v)
+                // Inside of all three: none is negative.
+                let is_inside = values[0] | values[1] | values[2] >= 0;
+                if is_inside
+                    && let Some(place) =
+                        self.place_along(triangle, (axis, per_normal), i * self.cell, line_v)
                 {
                     visit([i as usize, j as usize], place);
                 }
+                values = std::array::from_fn(|k| values[k] - step[k]);
             }
         }
     }
@@ -139,18 +148,26 @@ impl Converter {
         Extent { is_there: true, lines: [first, lines_below(hi).min(last_line)] }
     }
 
-    /// The edge on which the line at (line_u, line_v) pierces the triangle's plane.
-    fn place_along(&self, t: &Snapped, axis: usize, line_u: i64, line_v: i64) -> Option<usize> {
+    /// The edge on which the line at (line_u, line_v) pierces the triangle's plane; `per_normal` is about one
+    /// by the normal along the axis.
+    fn place_along(
+        &self,
+        t: &Snapped,
+        (axis, per_normal): (usize, f64),
+        line_u: i64,
+        line_v: i64,
+    ) -> Option<usize> {
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let [x0, u0, v0] = [t.corners[0][axis], t.corners[0][u], t.corners[0][v]];
         let [na, nu, nv] = [t.normal[axis], t.normal[u], t.normal[v]];
         let place = if nu == 0 && nv == 0 {
-            self.place_of(i128::from(x0), 1, t.normal, axis)
+            let (place, rest) = (x0.div_euclid(self.cell), x0.rem_euclid(self.cell));
+            if rest != 0 { place } else { place - before_tie(t.normal, axis) }
         } else {
             let (a, b) = (nu as f64 * (line_u - u0) as f64, nv as f64 * (line_v - v0) as f64);
-            let cells = (x0 as f64 - (a + b) / na as f64) / self.cell as f64;
-            let size = x0.abs() as f64 + (a.abs() + b.abs()) / na.abs() as f64;
-            let error = size / self.cell as f64 * FILTER;
+            let cells = (x0 as f64 - (a + b) * per_normal) * self.cells_per_unit;
+            let size = x0.abs() as f64 + (a.abs() + b.abs()) * per_normal.abs();
+            let error = size * self.cells_per_unit * FILTER;
             let below = if error < 0.5 { floor(cells) } else { 0 };
             let rest = cells - below as f64;
             if rest > error && 1.0 - rest > error {
@@ -174,9 +191,14 @@ impl Converter {
         if numerator.rem_euclid(step) != 0 {
             return place;
         }
-        let leading = normal.iter().find(|&&n| n != 0).map_or(0, |n| n.signum());
-        if leading * normal[axis].signum() > 0 { place - 1 } else { place }
+        place - before_tie(normal, axis)
     }
+}
+
+/// 1 where the translation of the grid puts a plane through a corner on the edge before it, else 0.
+fn before_tie(normal: [i64; 3], axis: usize) -> i64 {
+    let leading = normal.iter().find(|&&n| n != 0).map_or(0, |n| n.signum());
+    i64::from(leading * normal[axis].signum() > 0)
 }
 
 /// The largest integer that is not above a number of less than 2^62: the method for that takes longer.
@@ -216,11 +238,12 @@ impl Sides {
         Self { from, direction, bias }
     }
 
+    /// The edge functions at a line: negative beyond a side.
     #[inline]
-    fn contain(&self, line_u: i64, line_v: i64) -> bool {
-        (0..3).all(|k| {
+    fn values(&self, line_u: i64, line_v: i64) -> [i64; 3] {
+        std::array::from_fn(|k| {
             let ([pu, pv], [du, dv]) = (self.from[k], self.direction[k]);
-            du * (line_v - pv) - dv * (line_u - pu) + self.bias[k] >= 0
+            du * (line_v - pv) - dv * (line_u - pu) + self.bias[k]
         })
     }
 

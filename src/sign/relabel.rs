@@ -2,9 +2,9 @@
 
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedHitBrick, Border, CORNER_ROW, CornerBits, Crossing, Domain, EdgeBits, FlipRecord,
-    Flips, HitEdge, LINES, NO_PLANE, PATCH, ROWS, SIDE, SignBrick, SourcePlane, decode_borders,
-    decode_hits, edge_position, encode, find_regions,
+    AS_HIT, ArchivedHitBrick, Border, CORNER_ROW, CornerBits, Crossing, Domain, EdgeBits,
+    FlipRecord, Flips, HitEdge, LINES, NO_PLANE, PATCH, ROWS, SIDE, SignBrick, SourcePlane,
+    decode_borders, decode_hits, edge_position, encode, find_regions,
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
@@ -22,6 +22,7 @@ struct RelabelItem {
 
 struct Relabelled {
     key: u64,
+    flags: u32,
     bytes: rkyv::util::AlignedVec,
     stats: SignStats,
 }
@@ -61,7 +62,7 @@ pub fn relabel(
         |done: Relabelled| {
             pass.counts.add(&done.stats);
             if done.stats.bricks > 0 {
-                pass.append(done.key, 0, &done.bytes)?;
+                pass.append(done.key, done.flags, &done.bytes)?;
             }
             Ok::<(), SignError>(pass.item_done()?)
         },
@@ -111,13 +112,13 @@ impl Workspace {
         }
         let flips = &item.load.flips;
         let cell_units = f64::from(domain.cell_units);
-        let (mut brick, mut stats) = self.cross(record, flips, cell_units);
+        let (mut brick, mut flags, mut stats) = self.cross(record, flips, cell_units);
         let tips = apart(&self.signs, &find_tips(&self.signs), &brick.walls);
         if !tips.is_empty() {
             for [x, y, z] in &tips {
                 self.signs.rows[z * LINES + y] &= !(1 << x);
             }
-            (brick, stats) = self.cross(record, flips, cell_units);
+            (brick, flags, stats) = self.cross(record, flips, cell_units);
         }
         stats.tip_corners = tips.len() as u64;
         if let Some(borders) = borders
@@ -126,9 +127,9 @@ impl Workspace {
             let view = borders.view(number)?;
             brick.borders.extend(decode_borders(&view)?.borders.iter().map(Border::from));
         }
-        stats.bricks = u64::from(!brick.crossings.is_empty());
+        stats.bricks = u64::from(flags & AS_HIT != 0 || !brick.crossings.is_empty());
         let bytes = encode(&brick);
-        Ok(Relabelled { key: item.load.brick.0, bytes, stats })
+        Ok(Relabelled { key: item.load.brick.0, flags, bytes, stats })
     }
 
     /// Signs by the fill rule, from the corners of each row with their regions. What parity calls inside, the
@@ -162,22 +163,36 @@ impl Workspace {
         Ok(())
     }
 
-    /// Marks, crossings and walled faces of the signs as they are.
+    /// Marks, crossings and walled faces of the signs as they are; with the flags of the brick.
     fn cross(
         &mut self,
         record: Option<&ArchivedHitBrick>,
         flips: &[FlipRecord],
         cell_units: f64,
-    ) -> (SignBrick, SignStats) {
+    ) -> (SignBrick, u32, SignStats) {
         self.marks.set_differences(&self.signs);
         let mut stats = self.count();
-        let mut brick = match record.filter(|record| self.are_as_hit(record, flips)) {
-            Some(record) => self.take_hits(record, &mut stats),
-            None => self.pick_crossings(record, flips, &mut stats),
-        };
-        brick.walls = find_walls(&brick, &self.marks, &self.signs, cell_units);
+        if let Some(record) = record.filter(|record| self.is_as_hit(record, flips)) {
+            // The record of hits says it all.
+            let base_inside = self.signs.get([0; 3]);
+            let walls = find_walls(&self.marks, &self.signs, cell_units, |edge| {
+                let found = record
+                    .edges
+                    .binary_search_by_key(&edge, |hit| hit_edge(&hit.bits).edge())
+                    .ok()?;
+                Some(SourcePlane::from(&record.planes[record.hits[found].to_native() as usize]))
+            });
+            stats.crossings = self.marks.count_own();
+            stats.walled_faces = walls.len() as u64;
+            return (SignBrick { base_inside, walls, ..SignBrick::default() }, AS_HIT, stats);
+        }
+        let mut brick = self.pick_crossings(record, flips, &mut stats);
+        brick.walls = find_walls(&self.marks, &self.signs, cell_units, |edge| {
+            let found = brick.crossings.binary_search_by_key(&edge, |one| one.edge).ok()?;
+            brick.planes.get(brick.crossings[found].plane as usize).copied()
+        });
         stats.walled_faces = brick.walls.len() as u64;
-        (brick, stats)
+        (brick, 0, stats)
     }
 
     /// Counts corners that the brick owns, and leaf cells.
@@ -200,29 +215,11 @@ impl Workspace {
     }
 
     /// Whether just those edges are marked that were hit, each once, and no patch is there.
-    fn are_as_hit(&self, record: &ArchivedHitBrick, flips: &[FlipRecord]) -> bool {
-        flips.is_empty() && record.hits.len() == record.edges.len() && {
-            self.loaded.barrier == self.marks
-        }
-    }
-
-    /// The crossings of a brick that is marked as it was hit: the same as [`Self::pick_crossings`] finds.
-    fn take_hits(&self, record: &ArchivedHitBrick, stats: &mut SignStats) -> SignBrick {
-        let hits = record.hits.iter().map(|hit| hit.to_native());
-        let crossings: Vec<Crossing> = record
-            .edges
-            .iter()
-            .map(|edge| HitEdge { bits: edge.bits.to_native(), signed_sum: 0 }.edge())
-            .zip(hits)
-            .map(|(edge, plane)| Crossing { edge, plane })
-            .collect();
-        stats.crossings = self.marks.count_own();
-        SignBrick {
-            base_inside: self.signs.get([0; 3]),
-            crossings,
-            planes: record.planes.iter().map(SourcePlane::from).collect(),
-            ..SignBrick::default()
-        }
+    fn is_as_hit(&self, record: &ArchivedHitBrick, flips: &[FlipRecord]) -> bool {
+        flips.is_empty()
+            && !record.edges.is_empty()
+            && record.hits.len() == record.edges.len()
+            && self.loaded.barrier == self.marks
     }
 
     /// One crossing for every marked edge: the one nearest to the outside.
@@ -280,6 +277,10 @@ fn contradiction(item: &RelabelItem, expected: &'static str) -> SignError {
     SignError::Contradiction { brick: item.load.brick.position(), expected }
 }
 
+fn hit_edge(bits: &rkyv::rend::u32_le) -> HitEdge {
+    HitEdge { bits: bits.to_native(), signed_sum: 0 }
+}
+
 /// Walks the hit edges of a record.
 struct HitEdges<'r> {
     record: Option<&'r ArchivedHitBrick>,
@@ -293,8 +294,7 @@ impl<'r> HitEdges<'r> {
     }
 
     fn peek(&self) -> Option<HitEdge> {
-        let edge = self.record?.edges.get(self.next)?;
-        Some(HitEdge { bits: edge.bits.to_native(), signed_sum: 0 })
+        Some(hit_edge(&self.record?.edges.get(self.next)?.bits))
     }
 
     fn advance(&mut self, edge: HitEdge) -> &'r [rkyv::rend::u32_le] {

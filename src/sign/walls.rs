@@ -17,24 +17,24 @@
 use glam::DVec3;
 
 use crate::octree::{
-    CornerBits, EdgeBits, PATCH, SignBrick, SourcePlane, edge_index, face_index,
-    for_each_ambiguous_face,
+    CornerBits, EdgeBits, SourcePlane, edge_index, face_index, for_each_ambiguous_face,
 };
 
 /// Cosine between the outward sides of a wall, at most: what is blunter than 60 degrees is a crease,
 /// whose corners the rule of all other faces keeps.
 const OPPOSITE: f64 = -0.5;
 
-/// The walled faces of a brick, by its crossings, its marks and its signs.
+/// The walled faces of a brick, by its marks and its signs; `plane_of` tells the plane of the crossing on an
+/// edge, unless a patch crosses it.
 pub fn find_walls(
-    brick: &SignBrick,
     marks: &EdgeBits,
     signs: &CornerBits,
     cell_units: f64,
+    plane_of: impl Fn(u32) -> Option<SourcePlane>,
 ) -> Vec<u32> {
     let mut walls = Vec::new();
     for_each_ambiguous_face(marks, |axis, at| {
-        if is_walled(brick, signs, (axis, at), cell_units) {
+        if is_walled(&plane_of, signs, (axis, at), cell_units) {
             walls.push(face_index(axis, at));
         }
     });
@@ -44,7 +44,7 @@ pub fn find_walls(
 /// Whether more crossings of the face speak for a wall than for a gap, and two of its sides look away
 /// from each other.
 fn is_walled(
-    brick: &SignBrick,
+    plane_of: &impl Fn(u32) -> Option<SourcePlane>,
     signs: &CornerBits,
     (axis, at): (usize, [usize; 3]),
     cell_units: f64,
@@ -60,7 +60,7 @@ fn is_walled(
     let (inside, outside) = if signs.get(at) { (even, odd) } else { (odd, even) };
     let (mut votes, mut sides) = (0, [[DVec3::ZERO; 2]; 2]);
     for (lower, along) in [(even[0], 0), (even[0], 1), (odd[0], 1), (odd[1], 0)] {
-        let Some(plane) = plane_at(brick, edge_index(others[along], lower)) else { continue };
+        let Some(plane) = plane_of(edge_index(others[along], lower)) else { continue };
         let normal = plane.unit_normal();
         let [one, other] = inside
             .map(|c| normal.dot(DVec3::from(c.map(|c| c as f64))) * cell_units - plane.offset);
@@ -78,17 +78,10 @@ fn is_walled(
     votes > 0 && one.iter().any(|one| other.iter().any(|other| one.dot(*other) <= OPPOSITE))
 }
 
-/// The plane of the crossing on an edge, unless a patch crosses it.
-fn plane_at(brick: &SignBrick, edge: u32) -> Option<&SourcePlane> {
-    let found = brick.crossings.binary_search_by_key(&edge, |crossing| crossing.edge).ok()?;
-    let plane = brick.crossings[found].plane;
-    if plane & PATCH == 0 { brick.planes.get(plane as usize) } else { None }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::octree::{Crossing, LINES, edge_position};
+    use crate::octree::{LINES, edge_position};
 
     const CELL_UNITS: f64 = 64.0;
 
@@ -111,22 +104,21 @@ mod tests {
         }
         let mut marks = EdgeBits::default();
         marks.set_differences(&signs);
-        let mut brick = SignBrick { base_inside: signs.get([0; 3]), ..SignBrick::default() };
-        for (normal, offset) in sides {
+        let planes = sides.map(|(normal, offset)| {
             let (normal, offset) = (normal.as_vec3().to_array(), offset * CELL_UNITS);
-            brick.planes.push(SourcePlane { normal, offset, ..SourcePlane::default() });
-        }
-        marks.for_each(|edge| {
+            SourcePlane { normal, offset, ..SourcePlane::default() }
+        });
+        let plane_of = |edge| {
             let (axis, lower) = edge_position(edge);
             let mut upper = lower;
             upper[axis] += 1;
             let beyond = if is_within(lower) { upper } else { lower };
-            let plane = u32::from(height(sides[1], beyond) > height(sides[0], beyond));
-            brick.crossings.push(Crossing { edge, plane });
-        });
+            let side = usize::from(height(sides[1], beyond) > height(sides[0], beyond));
+            marks.get(edge).then_some(planes[side])
+        };
         let mut ambiguous = 0;
         for_each_ambiguous_face(&marks, |_, _| ambiguous += 1);
-        (find_walls(&brick, &marks, &signs, CELL_UNITS), ambiguous)
+        (find_walls(&marks, &signs, CELL_UNITS, plane_of), ambiguous)
     }
 
     #[test]

@@ -10,8 +10,8 @@ use crate::contour::mc::{cell_mask, cell_number, checked};
 use crate::contour::{CELLS, ContourError, ContourStats};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    ArchivedSignBrick, BrickKey, CornerBits, Domain, EdgeBits, EdgeBrick, PATCH, SIDE, SourcePlane,
-    clamp_to_edge, decode_edges, decode_signs, edge_index, edge_position, encode,
+    BrickKey, CornerBits, Crossing, Domain, EdgeBits, EdgeBrick, PATCH, SIDE, SignBricks,
+    SignRecord, SourcePlane, clamp_to_edge, decode_edges, edge_index, edge_position, encode,
 };
 use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
@@ -29,7 +29,7 @@ struct Placed {
 /// # Errors
 /// [`ContourError`].
 pub fn place_vertices(
-    signs: &BrickFile,
+    signs: SignBricks,
     domain: &Domain,
     resources: &Resources,
 ) -> Result<(BrickFile, ContourStats), ContourError> {
@@ -78,10 +78,10 @@ impl Workspace {
         }
     }
 
-    fn place(&mut self, signs: &BrickFile, number: usize) -> Result<Placed, ContourError> {
-        let key = signs.directory()[number].key;
+    fn place(&mut self, signs: SignBricks, number: usize) -> Result<Placed, ContourError> {
+        let key = signs.key(number);
         let view = signs.view(number)?;
-        self.load(decode_signs(&view)?);
+        self.load(view.record()?);
         let mut stats = ContourStats::default();
         let mut brick = EdgeBrick::default();
         // Cells and the own edges along an axis come in the same order.
@@ -99,7 +99,7 @@ impl Workspace {
                     for axis in (0..3).filter(|axis| axes >> axis & 1 == 1) {
                         let place = self.own_place(axis, next[axis], at);
                         brick.places.push(place.ok_or(ContourError::Contradiction {
-                            brick: BrickKey(key).position(),
+                            brick: key.position(),
                             expected: "marks where the signs of corners differ",
                         })?);
                         next[axis] += 1;
@@ -110,31 +110,31 @@ impl Workspace {
             }
         }
         stats.cell_vertices = brick.places.len() as u64;
-        Ok(Placed { key, bytes: encode(&brick), stats })
+        Ok(Placed { key: key.0, bytes: encode(&brick), stats })
     }
 
     /// Marks, signs and own crossings of the record.
-    fn load(&mut self, record: &ArchivedSignBrick) {
+    fn load(&mut self, record: SignRecord) {
         self.marks.clear();
         self.own.iter_mut().for_each(Vec::clear);
         let cell_units = f64::from(self.cell_units);
-        for crossing in record.crossings.iter() {
-            let (edge, plane) = (crossing.edge.to_native(), crossing.plane.to_native());
+        let planes = record.planes();
+        record.each_crossing(|Crossing { edge, plane }| {
             self.marks.set(edge);
             let (axis, at) = edge_position(edge);
             if at.contains(&SIDE) {
-                continue;
+                return;
             }
             let share = if plane & PATCH == 0 {
-                let plane = SourcePlane::from(&record.planes[plane as usize]);
+                let plane = SourcePlane::from(&planes[plane as usize]);
                 plane.offset_on_edge(axis, at, cell_units)
             } else {
                 clamp_to_edge(f64::from(plane & 0xffff) / 65536.0 * cell_units, cell_units)
             };
             let place = (share * cell_units).round() as u32;
             self.own[axis].push((edge, place.clamp(1, self.cell_units - 1)));
-        }
-        self.signs.from_marks(&self.marks, record.base_inside);
+        });
+        self.signs.from_marks(&self.marks, record.base_inside());
     }
 
     /// The place of own crossing `number` along `axis`, if it is on the edge that leaves `at`.

@@ -11,7 +11,7 @@ use crate::contour::ContourError;
 use crate::contour::mdc::cell::{edge_in_cell, lower_end, segments_on};
 use crate::contour::mdc::cut_cell::{CutBox, CutCell};
 use crate::contour::mdc::loaded::{face_point_key, far_point_key};
-use crate::contour::mdc::neighbourhood::{Neighbourhood, Patch};
+use crate::contour::mdc::neighbourhood::{Neighbourhood, OWN, Patch};
 use crate::contour::mdc::table::{axis_of_edge, edge_at_corner};
 use crate::octree::SIDE;
 
@@ -46,17 +46,32 @@ impl Edge {
     /// The same where all four cells are in the own brick: a shorter way.
     #[inline]
     fn ring_within(&self, nb: &Neighbourhood) -> Option<[Patch; 4]> {
+        let places = self.places_within(nb)?;
+        Some(places.map(|place| Patch { vertex: nb.own().vertex(place), slot: OWN }))
+    }
+
+    /// Where these four vertices are in the list of the own brick, if the cells are all in it.
+    #[inline]
+    fn places_within(&self, nb: &Neighbourhood) -> Option<[usize; 4]> {
         let is_within =
             (0..3).all(|a| (i32::from(a != self.axis)..SIDE as i32).contains(&self.lower[a]));
         if !is_within {
             return None;
         }
-        let mut ring = [None; 4];
-        for (patch, (down, number)) in ring.iter_mut().zip(AROUND[self.axis]) {
+        let mut places = [0; 4];
+        for (place, (down, number)) in places.iter_mut().zip(AROUND[self.axis]) {
             let at = std::array::from_fn(|a| (self.lower[a] - down[a]) as usize);
-            *patch = Some(nb.vertex(nb.find_within(at)?, number));
+            *place = nb.own().place_of_vertex(nb.find_within(at)?.rank(), number);
         }
-        Some(ring.map(|patch| patch.expect("all four are found")))
+        Some(places)
+    }
+
+    /// Whether surely no more than two vertices are around it, without a look at them.
+    #[inline]
+    pub fn is_between_two(&self, nb: &Neighbourhood) -> bool {
+        self.places_within(nb).is_some_and(|places| {
+            (0..4).filter(|slot| places[*slot] != places[(slot + 1) % 4]).count() < 3
+        })
     }
 }
 

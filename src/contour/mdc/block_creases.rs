@@ -11,6 +11,7 @@
 
 use glam::DVec3;
 
+use crate::contour::mdc::blocks::BlockPlanes;
 use crate::contour::mdc::cluster::{Block, CellPlane};
 use crate::contour::mdc::workspace::Workspace;
 use crate::octree::SIDE;
@@ -24,12 +25,13 @@ impl Workspace {
         &self,
         (low, side): ([usize; 3], usize),
         block: &Block,
+        found: &BlockPlanes,
         planes: &[CellPlane],
     ) -> bool {
         let Some(clustering) = &self.clustering else { return false };
         let Some(crease) = block.crease(planes, self.crease_cosine) else { return true };
         self.is_on_surface((low, side), crease)
-            && self.has_no_corner((low, side), block, clustering.cosine_squared())
+            && self.has_no_corner((low, side), block, found, clustering.cosine_squared())
     }
 
     /// Whether the crease at `at` passes only cells with surface in a block and the cells around it. Where it
@@ -71,6 +73,7 @@ impl Workspace {
         &self,
         (low, side): ([usize; 3], usize),
         block: &Block,
+        found: &BlockPlanes,
         cosine_squared: f64,
     ) -> bool {
         let [from, to] = [0, 1].map(|end| {
@@ -87,6 +90,7 @@ impl Workspace {
                         let is_known = number == last;
                         last = number;
                         is_known
+                            || found.has(number)
                             || number != 0
                                 && block.is_along(self.normals[number as usize], cosine_squared)
                     })

@@ -55,6 +55,12 @@ impl BlockPlanes {
         });
     }
 
+    /// Whether a plane is of the block or of an edge that leaves it.
+    #[inline]
+    pub(super) fn has(&self, number: u32) -> bool {
+        self.seen.get(number as usize).is_some_and(|seen| seen[0] == self.block)
+    }
+
     /// Where it is noted that a plane was seen.
     #[inline]
     fn seen(&mut self, number: u32) -> &mut [u32; 2] {
@@ -141,7 +147,7 @@ impl Workspace {
         let cosine_squared = clustering.cosine_squared();
         let is_along = |number: &u32| made.is_along(self.normals[*number as usize], cosine_squared);
         let is_fine = found.leaving.iter().all(is_along)
-            && self.keeps_crease((place_of(block.first()), block.side()), &made, planes);
+            && self.keeps_crease((place_of(block.first()), block.side()), &made, found, planes);
         is_fine.then_some(made)
     }
 

@@ -122,6 +122,14 @@ pub fn edge_in_cell(axis: usize, lower: [i32; 3], at: [i32; 3]) -> u8 {
     edge_at_corner(corner, axis as u8)
 }
 
+/// The number of an edge on the min face of `axis`, seen from the cell below.
+#[inline]
+pub const fn edge_below(edge: u8, axis: usize) -> u8 {
+    // Of the two bits for the place of an edge across its direction, the one of `axis`.
+    let is_second = axis == if edge / 4 == 2 { 1 } else { 2 };
+    edge | if is_second { 2 } else { 1 }
+}
+
 /// The edges of a mask of edges.
 #[cfg(test)]
 pub fn edges_of_mask(edges: u16) -> impl Iterator<Item = u8> {

@@ -11,7 +11,7 @@
 //! Source:     Ju and Udeshi 2006 (face vertices).
 
 use crate::contour::mdc::arcs::{Arc, Edge, edges_of};
-use crate::contour::mdc::cell::{cell_number, place_of, segments_on};
+use crate::contour::mdc::cell::{cell_number, edge_below, place_of, segments_on};
 use crate::contour::mdc::far_points::FarPoints;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::Neighbourhood;
@@ -103,7 +103,7 @@ fn add_ends(
     let own = nb.own();
     let packed = own.cells[rank];
     let number = cell_number(packed);
-    let cut = own.vertices[own.firsts[rank] as usize].cut;
+    let cut = own.first_vertex(rank).cut;
     let at = place_of(number).map(|c| c as i32);
     let low = (1 << cut.level()) - 1;
     for axis in 0..3 {
@@ -122,12 +122,11 @@ fn add_ends(
             continue;
         }
         for &pair in pairs {
-            let edges = edges_of(pair, at);
-            let upper = nb.vertex(here, pair[0]);
-            let edge =
-                crate::contour::mdc::cell::edge_in_cell(edges[0].axis, edges[0].lower, below);
-            let arc = Arc { axis, lower: nb.vertex(there, edge), upper };
+            let (lower, upper) =
+                (nb.vertex(there, edge_below(pair[0], axis)), nb.vertex(here, pair[0]));
+            let arc = Arc { axis, lower, upper };
             if !arc.is_inner() && !arc.is_far() && arc.is_explicit(nb.cell_units()) {
+                let edges = edges_of(pair, at);
                 let is_end = |edge: &Edge| arc.ends_at(edge, at);
                 ends.extend(edges.into_iter().filter(is_end).map(|edge| (arc.key(), arc, edge)));
             }

@@ -19,9 +19,9 @@ use crate::contour::mdc::leaf_vertex::Around;
 use crate::contour::mdc::workspace::Workspace;
 use crate::geom::qef::{Hit, Solution, meet};
 use crate::octree::{
-    AXIS_EDGES, BrickKey, LINES, PATCH, SIDE, SourcePlane, decode_signs, edge_position,
+    AXIS_EDGES, BrickKey, Crossing, LINES, PATCH, ROWS, SIDE, SignBricks, SourcePlane,
+    edge_position,
 };
-use crate::store::BrickFile;
 
 /// Most planes of edges around that are looked at.
 const MAX_PLANES: usize = 4;
@@ -48,7 +48,7 @@ impl Halo {
 #[derive(Clone, Copy)]
 pub struct Place<'s> {
     /// All bricks of signs.
-    pub signs: &'s BrickFile,
+    pub signs: SignBricks<'s>,
     /// The own brick.
     pub key: BrickKey,
 }
@@ -172,31 +172,29 @@ impl Workspace {
         numbers.clear();
         numbers.resize(LINES * LINES, 0);
         let key = if is_max { Some(place.key.upper(axis)) } else { place.key.lower(1 << axis) };
-        let Some(number) = key.and_then(|key| place.signs.find(key.0)) else { return Ok(()) };
+        let Some(number) = key.and_then(|key| place.signs.find(key)) else { return Ok(()) };
         let view = place.signs.view(number)?;
-        let record = decode_signs(&view)?;
+        let record = view.record()?;
         let (u, v) = ((axis + 1) % 3, (axis + 2) % 3);
         let wanted = if is_max { 0 } else { SIDE - 1 };
         let brick_units = self.cell_units as f64 * SIDE as f64;
         let shift = if is_max { brick_units } else { -brick_units };
         let first = axis as u32 * AXIS_EDGES;
-        let start = record.crossings.partition_point(|crossing| crossing.edge.to_native() < first);
-        for crossing in &record.crossings[start..] {
-            let (edge, plane) = (crossing.edge.to_native(), crossing.plane.to_native());
-            if edge >= first + AXIS_EDGES {
-                break;
+        let planes = record.planes();
+        record.each_crossing_within([first, first + AXIS_EDGES], |Crossing { edge, plane }| {
+            // Where it is along the axis alone: all of it takes longer.
+            let step = [1, LINES, ROWS][axis];
+            if (edge - first) as usize / step % LINES != wanted || plane & PATCH != 0 {
+                return;
             }
             let (_, at) = edge_position(edge);
-            if at[axis] != wanted || plane & PATCH != 0 {
-                continue;
-            }
-            let mut plane = SourcePlane::from(&record.planes[plane as usize]);
+            let mut plane = SourcePlane::from(&planes[plane as usize]);
             let normal = plane.unit_normal();
             plane.offset += normal[axis] * shift;
             self.planes.push(plane);
             self.normals.push(normal);
             self.halo.sides[side][at[v] * LINES + at[u]] = (self.normals.len() - 1) as u32;
-        }
+        });
         Ok(())
     }
 }

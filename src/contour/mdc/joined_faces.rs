@@ -19,8 +19,7 @@ use std::collections::HashMap;
 use crate::contour::ContourError;
 use crate::contour::mdc::table::{AMBIGUOUS_FACES, touches_twice};
 use crate::contour::mdc::workspace::Workspace;
-use crate::octree::{BrickKey, CornerBits, EdgeBits, SIDE, decode_signs, face_index};
-use crate::store::BrickFile;
+use crate::octree::{BrickKey, CornerBits, EdgeBits, SIDE, SignBricks, face_index};
 
 /// All six faces.
 const ALL_FACES: u8 = 0x3f;
@@ -40,7 +39,7 @@ struct GridCell {
 
 /// Decides about faces of cells in and around one brick.
 struct Faces<'w> {
-    signs: &'w BrickFile,
+    signs: SignBricks<'w>,
     own: BrickKey,
     corners: &'w CornerBits,
     walls: &'w [u32],
@@ -52,7 +51,7 @@ impl Workspace {
     /// as the walls would have them.
     pub(super) fn joined_faces(
         &mut self,
-        signs: &BrickFile,
+        signs: SignBricks,
         key: BrickKey,
         at: [usize; 3],
         mask: u8,
@@ -174,14 +173,14 @@ impl Faces<'_> {
 
     fn beyond(&mut self, key: BrickKey) -> Result<&Beyond, ContourError> {
         if !self.beyond.contains_key(&key.0) {
-            let found = self.signs.find(key.0).ok_or_else(|| self.missing())?;
+            let found = self.signs.find(key).ok_or_else(|| self.missing())?;
             let view = self.signs.view(found)?;
-            let record = decode_signs(&view)?;
+            let record = view.record()?;
             let mut marks = EdgeBits::default();
-            record.crossings.iter().for_each(|crossing| marks.set(crossing.edge.to_native()));
+            record.each_crossing(|crossing| marks.set(crossing.edge));
             let mut corners = CornerBits::default();
-            corners.from_marks(&marks, record.base_inside);
-            let walls = record.walls.iter().map(|face| face.to_native()).collect();
+            corners.from_marks(&marks, record.base_inside());
+            let walls = record.walls().iter().map(|face| face.to_native()).collect();
             self.beyond.insert(key.0, Beyond { corners, walls });
         }
         self.beyond.get(&key.0).ok_or_else(|| self.missing())

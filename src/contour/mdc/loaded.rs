@@ -1,10 +1,11 @@
 //! A brick of cells, or its side that touches another brick, ready to be looked up in.
 //!
-//! Memory:     some 40 bytes a cell and 28 a component.
+//! Memory:     some 16 bytes a cell and 24 a vertex.
 
 use crate::contour::ContourError;
 use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of, number_at};
 use crate::contour::mdc::cut_cell::CutCell;
+use crate::contour::mdc::table::NO_COMPONENT;
 use crate::mesh::Surface;
 use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
 
@@ -19,14 +20,17 @@ pub struct Vertex {
     pub cut: CutCell,
 }
 
+/// In the number of the first vertex of a cell: all its components have it.
+const SHARED: u32 = 1 << 31;
+
 /// A brick as seen from another, or from itself.
 pub struct Loaded {
     /// Packed cells, ascending.
     pub cells: Vec<u32>,
-    /// First component of each cell.
-    pub firsts: Vec<u32>,
-    /// The vertex of every component.
-    pub vertices: Vec<Vertex>,
+    /// The first vertex of each cell; with [`SHARED`] that of all its components.
+    firsts: Vec<u32>,
+    /// The vertices of the cells: one for every component, and one of a cluster that has no other.
+    vertices: Vec<Vertex>,
     /// First offset of each cell.
     pub offset_firsts: Vec<u32>,
     /// Offsets of the crossings on own edges.
@@ -127,11 +131,8 @@ impl<'r> CutWalk<'r> {
         number < self.end && self.count == 1
     }
 
-    /// Which vertex of its cluster the next component has.
+    /// Which vertex of its cluster, which has several, the next component has.
     fn member(&mut self) -> Option<u32> {
-        if self.count == 1 {
-            return Some(0);
-        }
         self.member += 1;
         self.record.members.get(self.member - 1).map(|member| u32::from(*member))
     }
@@ -160,24 +161,58 @@ impl Loaded {
             cut: CutCell::above(above.level.to_native(), key.position()),
         });
         let mut loaded = Self::with_room(if is_whole { record.cells.len() } else { 0 });
+        loaded.vertices.extend(above);
         let mut walk = CutWalk::new(record);
         let mut offset = 0;
         let (side_bits, side) = side_of(steps);
+        // The vertex of the cluster under way, if it has one, and where the cluster ends.
+        let mut shared = (0, 0);
         for cell in record.cells.iter() {
             let cell = cell.to_native();
-            let own_edges = usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
+            let first_offset = offset;
+            offset += usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
             let number = cell_number(cell);
             let is_wanted = number & side_bits == side;
-            if !is_wanted && walk.is_in_one_vertex(number) {
-                offset += own_edges;
+            let goes_on = walk.is_in_one_vertex(number);
+            if !is_wanted && goes_on {
+                continue;
+            }
+            if is_wanted {
+                loaded.cells.push(cell);
+                loaded.offset_firsts.push(loaded.offsets.len() as u32);
+                let own = record.offsets.get(first_offset..offset);
+                let own = own.ok_or_else(|| wrong("an offset for every own edge"))?;
+                loaded.offsets.extend(own.iter().map(|offset| offset.to_native()));
+            }
+            if goes_on && number < shared.1 {
+                loaded.firsts.push(shared.0 | SHARED);
                 continue;
             }
             let count = u32::from(components_of(cell).count);
             let (cut, first, is_cluster) = walk.step(number, count);
+            if above.is_some() {
+                if is_wanted {
+                    loaded.firsts.push(SHARED);
+                }
+                continue;
+            }
+            let vertex_of = |number: u32| {
+                let position = record.positions.get(number as usize);
+                let position = position.ok_or_else(|| wrong("a position for every vertex"))?;
+                let position = moved(position.map(|c| c.to_native()));
+                Ok::<_, ContourError>(Vertex { number, position, cut })
+            };
+            let next = loaded.vertices.len() as u32;
+            if walk.is_in_one_vertex(number) {
+                if is_wanted {
+                    shared = (next, walk.end);
+                    loaded.firsts.push(next | SHARED);
+                    loaded.vertices.push(vertex_of(first)?);
+                }
+                continue;
+            }
             if is_wanted {
-                loaded.cells.push(cell);
-                loaded.firsts.push(loaded.vertices.len() as u32);
-                loaded.offset_firsts.push(loaded.offsets.len() as u32);
+                loaded.firsts.push(next);
             }
             for component in 0..count {
                 let number = if is_cluster {
@@ -185,23 +220,10 @@ impl Loaded {
                 } else {
                     first + component
                 };
-                if let Some(vertex) = above {
-                    if is_wanted {
-                        loaded.vertices.push(vertex);
-                    }
-                } else if is_wanted {
-                    let position = record.positions.get(number as usize);
-                    let position = position.ok_or_else(|| wrong("a position for every vertex"))?;
-                    let position = moved(position.map(|c| c.to_native()));
-                    loaded.vertices.push(Vertex { number, position, cut });
+                if is_wanted {
+                    loaded.vertices.push(vertex_of(number)?);
                 }
             }
-            if is_wanted {
-                let own = record.offsets.get(offset..offset + own_edges);
-                let own = own.ok_or_else(|| wrong("an offset for every own edge"))?;
-                loaded.offsets.extend(own.iter().map(|offset| offset.to_native()));
-            }
-            offset += own_edges;
         }
         if is_whole {
             if record.surfaces.len() > 1 && record.surfaces.len() != record.offsets.len() {
@@ -221,11 +243,36 @@ impl Loaded {
         Ok(loaded)
     }
 
+    /// The place in the list of vertices of that of the component that crosses `edge`, of the cell with this
+    /// rank.
+    #[inline]
+    pub fn place_of_vertex(&self, rank: usize, edge: u8) -> usize {
+        let first = self.firsts[rank];
+        if first & SHARED != 0 {
+            return (first & !SHARED) as usize;
+        }
+        let component = components_of(self.cells[rank]).component_of_edge[usize::from(edge)];
+        debug_assert!(component != NO_COMPONENT);
+        first as usize + usize::from(component)
+    }
+
+    /// A vertex by its place in the list.
+    #[inline]
+    pub fn vertex(&self, place: usize) -> Vertex {
+        self.vertices[place]
+    }
+
+    /// The first vertex of the cell with this rank.
+    #[inline]
+    pub fn first_vertex(&self, rank: usize) -> &Vertex {
+        &self.vertices[(self.firsts[rank] & !SHARED) as usize]
+    }
+
     fn with_room(cells: usize) -> Self {
         Self {
             cells: Vec::with_capacity(cells),
             firsts: Vec::with_capacity(cells),
-            vertices: Vec::with_capacity(cells + cells / 8),
+            vertices: Vec::with_capacity(cells / 2),
             offset_firsts: Vec::with_capacity(cells),
             offsets: Vec::with_capacity(cells + cells / 2),
             surfaces: Vec::new(),

@@ -82,7 +82,7 @@ pub fn look_at(
         let mut rank = 0;
         while let Some(&cell) = nb.own().cells.get(rank) {
             let own = nb.own();
-            let cut = own.vertices[own.firsts[rank] as usize].cut;
+            let cut = own.first_vertex(rank).cut;
             let first = cut.first();
             let last = first + (1 << (3 * cut.level()));
             let cells = &own.cells[rank..];

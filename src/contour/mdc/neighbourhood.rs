@@ -6,7 +6,7 @@
 //! Fails:      [`ContourError::Contradiction`] where sound bricks have a cell and these do not.
 
 use crate::contour::ContourError;
-use crate::contour::mdc::cell::{cell_mask, cell_number, components_of, edge_in_cell, number_at};
+use crate::contour::mdc::cell::{cell_mask, cell_number, edge_in_cell, number_at};
 use crate::contour::mdc::cut_cell::{CutBox, CutCell, steps_of};
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::loaded::{Loaded, Vertex};
@@ -29,6 +29,14 @@ const ABOVE: u64 = 1 << 42;
 pub struct Found {
     slot: usize,
     rank: usize,
+}
+
+impl Found {
+    /// Its rank in its brick.
+    #[inline]
+    pub fn rank(self) -> usize {
+        self.rank
+    }
 }
 
 /// A vertex with the brick that it was found in.
@@ -198,8 +206,7 @@ impl<'f> Neighbourhood<'f> {
     /// The cell of the cut that a leaf cell lies in.
     #[inline]
     pub fn cut(&self, found: Found) -> CutCell {
-        let brick = self.loaded(found);
-        brick.vertices[brick.firsts[found.rank] as usize].cut
+        self.loaded(found).first_vertex(found.rank).cut
     }
 
     /// A leaf cell that sound bricks have.
@@ -224,10 +231,8 @@ impl<'f> Neighbourhood<'f> {
     #[inline]
     pub fn vertex(&self, found: Found, edge: u8) -> Patch {
         let brick = self.loaded(found);
-        let component = components_of(brick.cells[found.rank]).component_of_edge[usize::from(edge)];
-        debug_assert!(component != crate::contour::mdc::table::NO_COMPONENT);
-        let at = brick.firsts[found.rank] + u32::from(component);
-        Patch { vertex: brick.vertices[at as usize], slot: found.slot }
+        let vertex = brick.vertex(brick.place_of_vertex(found.rank, edge));
+        Patch { vertex, slot: found.slot }
     }
 
     /// The vertex of the component of the cell at `at` that crosses the edge along `axis` from

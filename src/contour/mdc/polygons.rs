@@ -102,7 +102,7 @@ impl<'p> Polygons<'p> {
                 continue;
             }
             let at = place_of(cell_number(cell));
-            let cut = own.vertices[own.firsts[rank] as usize].cut;
+            let cut = own.first_vertex(rank).cut;
             // In the same cluster all around, which has one vertex: no polygon.
             let inner = if cut.level() > 0 && !cut.is_multi() {
                 let low = (1 << cut.level()) - 1;
@@ -121,11 +121,14 @@ impl<'p> Polygons<'p> {
                 let source = own.source(next_offset);
                 next_offset += 1;
                 if (inner | 1 << axis) == 7 {
-                    let vertex = own.vertices[own.firsts[rank] as usize];
+                    let vertex = *own.first_vertex(rank);
                     self.add_inner(&[Patch { slot: OWN, vertex }], surface.zip(source), &mut out);
                     continue;
                 }
                 let edge = Edge { axis, lower: at.map(|c| c as i32) };
+                if surface.is_none() && edge.is_between_two(&self.nb) {
+                    continue;
+                }
                 if let Some(ring) = self.draw(edge, offset, mask & 1 == 1, &mut out)? {
                     self.add_inner(&ring, surface.zip(source), &mut out);
                 }

@@ -26,7 +26,7 @@ use crate::contour::mdc::neighbourhood::{Neighbourhood, brick_around};
 use crate::contour::mdc::workspace::Workspace;
 use crate::contour::mdc::{HAS_FLAGGED, HAS_MULTI, HAS_REACHES, above, face_points, flags_of};
 use crate::contour::{ContourError, ContourOptions, ContourStats};
-use crate::octree::{BrickKey, Domain, encode};
+use crate::octree::{BrickKey, Domain, SignBricks, encode};
 use crate::store::{BrickFile, BrickWriter, Resources, directory_name};
 
 /// What a byte of a record takes while it is looked at, with the sides of those around.
@@ -40,7 +40,7 @@ pub const LOOKS: [&str; 2] = ["look_odd.bricks", "look_even.bricks"];
 /// # Errors
 /// [`ContourError`].
 pub fn separate(
-    signs: &BrickFile,
+    signs: SignBricks,
     cells: &BrickFile,
     domain: &Domain,
     options: &ContourOptions,
@@ -105,7 +105,7 @@ struct Found {
 }
 
 struct Separation<'s> {
-    signs: &'s BrickFile,
+    signs: SignBricks<'s>,
     cells: &'s BrickFile,
     /// Keys of bricks that clusters above the brick cover.
     covered: Vec<Range<u64>>,

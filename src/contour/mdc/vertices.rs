@@ -13,7 +13,7 @@ use crate::contour::mdc::plain::later;
 use crate::contour::mdc::workspace::{EdgeCrossing, Workspace};
 use crate::contour::{CELLS, ContourError, ContourOptions, ContourStats, Method, SurfaceDetail};
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{BrickKey, CellBrick, Domain, RecordBytes, decode_signs, encode};
+use crate::octree::{CellBrick, Domain, RecordBytes, SignBricks, encode};
 use crate::store::{BrickFile, BrickPass, Resources, StoreError, ordered_by_weight};
 
 /// What a byte of a record of signs takes while vertices are placed, with the record of cells.
@@ -33,7 +33,7 @@ struct Placed {
 /// # Errors
 /// [`ContourError`].
 pub fn place_vertices(
-    signs: &BrickFile,
+    signs: SignBricks,
     domain: &Domain,
     options: &ContourOptions,
     resources: &Resources,
@@ -55,7 +55,7 @@ pub fn place_vertices(
         |space, number| {
             let _brick = resident.hold(1);
             let (brick, stats) = space.place(signs, number, Vec::new())?;
-            let key = signs.directory()[number].key;
+            let key = signs.key(number).0;
             Ok(Placed { key, flags: flags_of(&brick), bytes: encode(&brick), stats })
         },
         |placed: Placed| {
@@ -74,20 +74,19 @@ impl Workspace {
     /// [`ContourError`].
     pub fn place(
         &mut self,
-        signs: &BrickFile,
+        signs: SignBricks,
         number: usize,
         banned: Vec<u32>,
     ) -> Result<(CellBrick, ContourStats), ContourError> {
-        let key = signs.directory()[number].key;
+        let key = signs.key(number);
         let view = signs.view(number)?;
-        let record = decode_signs(&view)?;
-        self.load(record);
+        self.load(view.record()?);
         self.beyond.clear();
         self.halo.clear();
         self.touched.find(&self.marks);
         let mut stats = ContourStats::default();
         let mut brick = CellBrick { banned, ..CellBrick::default() };
-        let place = Place { signs, key: BrickKey(key) };
+        let place = Place { signs, key };
         for word in 0..self.touched.0.len() {
             let bits = self.touched.0[word];
             if bits != 0 {

@@ -1,7 +1,7 @@
 //! What a thread needs to place the vertices of one brick after another: the brick's crossings, ready to be
 //! looked up, and room for what is made of them.
 //!
-//! In:         a [`crate::octree::SignBrick`] as it is archived.
+//! In:         a [`SignRecord`].
 //! Out:        signs, marks, crossings with their planes, by place.
 //! Units:      cells about the brick's min corner; planes in lattice units from there.
 //! Memory:     some 40 bytes a crossing, and what clusters take.
@@ -21,8 +21,8 @@ use crate::contour::mdc::patch_surfaces::PatchSurfaces;
 use crate::contour::{ContourOptions, Method, SurfaceDetail};
 use crate::geom::qef::QefOptions;
 use crate::octree::{
-    ArchivedSignBrick, Border, CornerBits, Domain, EdgeBits, LINES, NO_SOURCE, PATCH, ROWS, SIDE,
-    SourcePlane, edge_position, surface_of,
+    Border, CornerBits, Crossing, Domain, EdgeBits, LINES, NO_SOURCE, PATCH, ROWS, SIDE,
+    SignRecord, SourcePlane, edge_position, surface_of,
 };
 
 /// A crossing as the cells around it need it.
@@ -145,7 +145,7 @@ impl Workspace {
     }
 
     /// Signs, marks and crossings of the record.
-    pub(super) fn load(&mut self, record: &ArchivedSignBrick) {
+    pub(super) fn load(&mut self, record: SignRecord) {
         self.marks.clear();
         self.crossings.clear();
         let mut row = 0;
@@ -153,16 +153,15 @@ impl Workspace {
         let cell_units = self.cell_units as f64;
         self.planes.clear();
         self.walls.clear();
-        self.walls.extend(record.walls.iter().map(|face| face.to_native()));
+        self.walls.extend(record.walls().iter().map(|face| face.to_native()));
         self.borders.clear();
-        self.borders.extend(record.borders.iter().map(Border::from));
-        self.planes.extend(record.planes.iter().map(SourcePlane::from));
+        self.borders.extend(record.borders().iter().map(Border::from));
+        self.planes.extend(record.planes().iter().map(SourcePlane::from));
         self.normals.clear();
         self.normals.push(DVec3::ZERO);
         self.normals.extend(self.planes.iter().map(SourcePlane::unit_normal));
         self.is_smooth = self.spans_less_than_a_crease();
-        for crossing in record.crossings.iter() {
-            let (edge, plane) = (crossing.edge.to_native(), crossing.plane.to_native());
+        record.each_crossing(|Crossing { edge, plane }| {
             self.marks.set(edge);
             let here = edge as usize / LINES;
             while row <= here {
@@ -180,13 +179,14 @@ impl Workspace {
                 has_patches = true;
                 EdgeCrossing { offset, normal: 0, surface: NO_SURFACE, source: NO_SOURCE }
             });
-        }
+        });
         self.row_starts[row..].fill(self.crossings.len() as u32);
         if self.surfaces != SurfaceDetail::None && has_patches {
-            let edges = record.crossings.iter().map(|crossing| crossing.edge.to_native());
-            self.patches.find(edges, &mut self.crossings);
+            let mut edges = Vec::with_capacity(self.crossings.len());
+            record.each_crossing(|crossing| edges.push(crossing.edge));
+            self.patches.find(edges.into_iter(), &mut self.crossings);
         }
-        self.signs.from_marks(&self.marks, record.base_inside);
+        self.signs.from_marks(&self.marks, record.base_inside());
         if self.clustering.is_some() {
             self.begin_leaves();
         }

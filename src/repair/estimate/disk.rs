@@ -251,10 +251,18 @@ impl DiskModel<'_> {
             choose: (kept + soup + hits + flips + signs + cells + 2.0 * surface) as u64,
             place: (kept + soup + hits + flips + signs + cells) as u64,
             // Two looks, or the last one and the surface.
-            separate: (kept + soup + signs + cells + 2.0 * surface) as u64,
-            draw: (kept + soup + signs + cells + surface + drawn + drawing) as u64,
-            write: (kept + soup + signs + cells + surface + drawn + painting + output + aside)
-                as u64,
+            separate: (kept + soup + hits + signs + cells + 2.0 * surface) as u64,
+            draw: (kept + soup + hits + signs + cells + surface + drawn + drawing) as u64,
+            write: (kept
+                + soup
+                + hits
+                + signs
+                + cells
+                + surface
+                + drawn
+                + painting
+                + output
+                + aside) as u64,
             prove: (kept + soup + cells + surface + drawn + output + self.proof()) as u64,
             measure: (kept + soup + output + self.measuring(triangles)) as u64,
         }

@@ -89,7 +89,7 @@ impl MemoryModel<'_> {
         let openings = FLIP_BYTES * most.flips as f64 + FACE_BYTES * most.odd_faces as f64;
         let patch = window(files.hits) + openings.min(share);
         let flood = window(files.hits) + (FACE_BYTES * most.odd_faces as f64).min(share);
-        let contour = window(files.signs) + window(files.cells);
+        let contour = window(files.hits) + window(files.signs) + window(files.cells);
         let early = read.max(bin).max(examine);
         let painting = if self.attributes.any() {
             (CORNERS_BYTES * most.triangles as f64).min(share / 1.5)

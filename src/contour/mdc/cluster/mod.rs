@@ -35,7 +35,7 @@ pub use planes::{CellPlane, Group, JUDGES_ONLY, PlaneHit};
 pub use summary::{Part, join};
 
 use crate::contour::mdc::cell::{
-    cell_mask, cell_number, components_of, number_at, place_of, segments_on,
+    cell_mask, cell_number, components_of, edge_below, number_at, place_of, segments_on,
 };
 use crate::contour::mdc::cluster::corners::Corners;
 use crate::contour::mdc::cluster::cut::Cut;
@@ -316,7 +316,7 @@ impl Clustering {
                 let other = usize::from(self.ranks[number_at(below)]);
                 for &[edge, _] in pairs {
                     let here = cut.component(rank, usize::from(edge));
-                    let there = cut.component(other, across(edge, axis));
+                    let there = cut.component(other, usize::from(edge_below(edge, axis)));
                     let (a, b) = (self.node_of[here], self.node_of[there]);
                     unite(&mut self.joined, a - first_node as u32, b - first_node as u32);
                 }
@@ -380,13 +380,6 @@ impl Clustering {
         self.groups.truncate(first_group);
         self.groups.extend_from_slice(&self.merged_groups);
     }
-}
-
-/// The number of an edge on the min face of `axis`, seen from the cell below.
-const fn across(edge: u8, axis: usize) -> usize {
-    // Of the two bits for the place of an edge across its direction, the one of `axis`.
-    let is_second = axis == if edge / 4 == 2 { 1 } else { 2 };
-    (edge | if is_second { 2 } else { 1 }) as usize
 }
 
 fn find(joined: &mut [u32], mut i: u32) -> u32 {

@@ -108,7 +108,7 @@ fn euler_of_pieces(brick: &CellBrick, low: [usize; 3], side: usize) -> Vec<i32> 
                 if held(beyond) {
                     let other = rank_at(beyond).expect("a crossed face has two cells");
                     let there = components_of(brick.cells[other]);
-                    let component = there.component_of_edge[across(a, face / 2)];
+                    let component = there.component_of_edge[usize::from(edge_below(a, face / 2))];
                     unite(&mut joined, number as u32, number_of[&(other, component)] as u32);
                 }
             }
