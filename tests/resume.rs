@@ -222,6 +222,12 @@ fn a_file_that_lies_is_made_again_and_never_believed() {
         }
     }
     assert!(lies > 100, "only {lies} lies");
+    let is_proved = |moment: &Moment| moment.step == "prove" && moment.items == 0;
+    let (_, image) = filmed.images.iter().find(|(moment, _)| is_proved(moment)).expect("a proof");
+    let proved = image.work_folder().join("output.part");
+    for lie in LIES {
+        assert_lie_is_found(&filmed, image, &proved, lie, &mut random);
+    }
 }
 
 #[test]

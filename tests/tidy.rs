@@ -78,6 +78,7 @@ const HOMES: [(&str, &[&str]); 30] = [
             "octree/brick.rs",
             "octree/cell_brick.rs",
             "octree/edge_brick.rs",
+            "octree/sign_bricks.rs",
             // These hand on the aligned bytes that `encode` returns.
             "scan/mod.rs",
             "sign/relabel.rs",

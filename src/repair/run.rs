@@ -400,7 +400,9 @@ impl Run<'_> {
         handles: &mut Handles,
         last: Step,
     ) -> Result<(), RepairError> {
-        if let (None, Some(written)) = (workspace.next_step(), workspace.written()) {
+        // What was proved before this run may have been changed since.
+        let is_proved = workspace.next_step().is_none_or(|step| step > Step::Prove);
+        if let Some(written) = workspace.written().filter(|_| is_proved) {
             check_output(workspace.part(), &written, workspace.scratch())?;
         }
         loop {

@@ -412,6 +412,8 @@ impl Run<'_> {
             place_vertices(signs, findings.domain(), &self.contour_options(findings), resources)
                 .map_err(RepairError::Contour)?;
         findings.contour = stats;
+        // What comes next looks at few of these.
+        [&handles.hits, &handles.signs].into_iter().flatten().for_each(BrickFile::let_windows_go);
         Ok(hand_on(cells, &mut handles.cells))
     }
 

@@ -201,19 +201,19 @@ impl Step {
         last_reader.is_none_or(|reader| reader >= finished)
     }
 
-    /// The step after which all inputs of this one are there, given the files that are.
+    /// The last step from which on all steps up to this one find their inputs, given the files that are there.
     pub fn with_inputs(self, is_there: impl Fn(&str) -> bool) -> Self {
         let mut first = self;
-        while let Some(writer) = first
-            .reads()
-            .iter()
-            .filter(|file| !is_there(file))
-            .filter_map(|f| Self::writer_of(f))
-            .min()
-        {
-            first = writer;
+        loop {
+            let under_way = Self::ALL.into_iter().filter(|step| (first..=self).contains(step));
+            let missing = under_way.flat_map(Self::reads).filter(|file| !is_there(file));
+            // What a step under way leaves will be there.
+            let writers = missing.filter_map(|f| Self::writer_of(f)).filter(|w| *w < first);
+            match writers.min() {
+                Some(writer) => first = writer,
+                None => return first,
+            }
         }
-        first
     }
 }
 
@@ -249,6 +249,11 @@ mod tests {
         assert_eq!(Step::Sign.with_inputs(|file| file != REGIONS), Step::Flood);
         assert_eq!(Step::Sign.with_inputs(|file| file != REGIONS && file != FLIPS), Step::Patch);
         assert_eq!(Step::Prove.with_inputs(|file| file == BINS), Step::Read);
+        let of_place = [SOUP, HITS, SIGNS];
+        assert_eq!(Step::Place.with_inputs(|file| of_place.contains(&file)), Step::Place);
+        let without_signs =
+            Step::Place.with_inputs(|file| file != SIGNS && of_place.contains(&file));
+        assert_eq!(without_signs, Step::Read, "on the way what is thickened is scanned again");
         assert_eq!(Step::Prove.with_inputs(|_| false), Step::Read);
     }
 }

@@ -5,6 +5,7 @@
 use crate::contour::ContourError;
 use crate::contour::mdc::cell::{OWN_EDGES, cell_mask, cell_number, components_of, number_at};
 use crate::contour::mdc::cut_cell::CutCell;
+use crate::contour::mdc::cut_walk::CutWalk;
 use crate::contour::mdc::table::NO_COMPONENT;
 use crate::mesh::Surface;
 use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
@@ -45,99 +46,6 @@ pub struct Loaded {
     pub point_positions: Vec<[i32; 3]>,
 }
 
-/// Walks the cells of the cut along the leaf cells.
-struct CutWalk<'r> {
-    record: &'r ArchivedCellBrick,
-    cluster: usize,
-    member: usize,
-    flagged: usize,
-    reach: usize,
-    /// First vertex of the cell of the cut under way.
-    vertex: u32,
-    /// End of the cluster under way, in leaf numbers, and how many vertices it has.
-    end: usize,
-    count: u32,
-    cut: CutCell,
-}
-
-impl<'r> CutWalk<'r> {
-    fn new(record: &'r ArchivedCellBrick) -> Self {
-        let cut = CutCell::new(0, 0, false, false);
-        Self {
-            record,
-            cluster: 0,
-            member: 0,
-            flagged: 0,
-            reach: 0,
-            vertex: 0,
-            end: 0,
-            count: 0,
-            cut,
-        }
-    }
-
-    fn is_flagged(&mut self, first: usize) -> bool {
-        let flagged = &self.record.flagged;
-        while flagged.get(self.flagged).is_some_and(|f| usize::from(f.to_native()) < first) {
-            self.flagged += 1;
-        }
-        flagged.get(self.flagged).is_some_and(|f| usize::from(f.to_native()) == first)
-    }
-
-    /// The face that the vertex of a leaf cell reaches through.
-    #[inline]
-    fn reaches(&mut self, number: usize) -> Option<u8> {
-        let reaches = &self.record.reaches;
-        while reaches.get(self.reach).is_some_and(|r| usize::from(r.cell.to_native()) < number) {
-            self.reach += 1;
-        }
-        let reach = reaches.get(self.reach)?;
-        (reach.is_granted && usize::from(reach.cell.to_native()) == number).then_some(reach.face)
-    }
-
-    /// The cell of the cut that the leaf cell lies in, with its first vertex; the leaf's components
-    /// have the vertices that `member` tells.
-    #[inline]
-    fn step(&mut self, number: usize, components: u32) -> (CutCell, u32, bool) {
-        if number < self.end {
-            return (self.cut, self.vertex - self.count, true);
-        }
-        if let Some(cluster) = self.record.clusters.get(self.cluster) {
-            let cluster = cluster.to_native();
-            let (first, level) = ((cluster & 0x7fff) as usize, cluster >> 15 & 7);
-            if first <= number {
-                self.cluster += 1;
-                self.end = first + (1 << (3 * level));
-                self.count = cluster >> 18;
-                self.vertex += self.count;
-                let flagged = self.is_flagged(first);
-                self.cut = CutCell::new(first, level, flagged, self.count > 1);
-                return (self.cut, self.vertex - self.count, true);
-            }
-        }
-        let flagged = !self.record.flagged.is_empty() && self.is_flagged(number);
-        let mut cut = CutCell::new(number, 0, flagged, components > 1);
-        if let Some(face) = self.reaches(number) {
-            cut = cut.reaching(face);
-        }
-        self.vertex += components;
-        (cut, self.vertex - components, false)
-    }
-
-    /// Whether a leaf cell lies in the cluster under way, which has one vertex: then there is nothing to
-    /// step over.
-    #[inline]
-    fn is_in_one_vertex(&self, number: usize) -> bool {
-        number < self.end && self.count == 1
-    }
-
-    /// Which vertex of its cluster, which has several, the next component has.
-    fn member(&mut self) -> Option<u32> {
-        self.member += 1;
-        self.record.members.get(self.member - 1).map(|member| u32::from(*member))
-    }
-}
-
 impl Loaded {
     /// Loads a brick that lies `steps` bricks away along each axis, -1, 0 or 1: of its cells those
     /// that touch the brick it is seen from, and all of them when it is that brick.
@@ -150,97 +58,19 @@ impl Loaded {
         steps: [i32; 3],
         brick_units: i64,
     ) -> Result<Self, ContourError> {
-        let shift = steps.map(|step| step * brick_units as i32);
-        let moved =
-            |position: [i32; 3]| -> [i32; 3] { std::array::from_fn(|a| position[a] + shift[a]) };
-        let wrong = |expected| ContourError::Contradiction { brick: key.position(), expected };
         let is_whole = steps == [0; 3];
-        let above = record.above.as_ref().map(|above| Vertex {
-            number: above.owner.to_native(),
-            position: moved(above.position.map(|c| c.to_native())),
-            cut: CutCell::above(above.level.to_native(), key.position()),
-        });
-        let mut loaded = Self::with_room(if is_whole { record.cells.len() } else { 0 });
-        loaded.vertices.extend(above);
-        let mut walk = CutWalk::new(record);
-        let mut offset = 0;
+        let shift = steps.map(|step| step * brick_units as i32);
+        let mut filling = Filling::new(record, key, shift, is_whole);
         let (side_bits, side) = side_of(steps);
-        // The vertex of the cluster under way, if it has one, and where the cluster ends.
-        let mut shared = (0, 0);
         for cell in record.cells.iter() {
             let cell = cell.to_native();
-            let first_offset = offset;
-            offset += usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
-            let number = cell_number(cell);
-            let is_wanted = number & side_bits == side;
-            let goes_on = walk.is_in_one_vertex(number);
-            if !is_wanted && goes_on {
-                continue;
-            }
-            if is_wanted {
-                loaded.cells.push(cell);
-                loaded.offset_firsts.push(loaded.offsets.len() as u32);
-                let own = record.offsets.get(first_offset..offset);
-                let own = own.ok_or_else(|| wrong("an offset for every own edge"))?;
-                loaded.offsets.extend(own.iter().map(|offset| offset.to_native()));
-            }
-            if goes_on && number < shared.1 {
-                loaded.firsts.push(shared.0 | SHARED);
-                continue;
-            }
-            let count = u32::from(components_of(cell).count);
-            let (cut, first, is_cluster) = walk.step(number, count);
-            if above.is_some() {
-                if is_wanted {
-                    loaded.firsts.push(SHARED);
-                }
-                continue;
-            }
-            let vertex_of = |number: u32| {
-                let position = record.positions.get(number as usize);
-                let position = position.ok_or_else(|| wrong("a position for every vertex"))?;
-                let position = moved(position.map(|c| c.to_native()));
-                Ok::<_, ContourError>(Vertex { number, position, cut })
-            };
-            let next = loaded.vertices.len() as u32;
-            if walk.is_in_one_vertex(number) {
-                if is_wanted {
-                    shared = (next, walk.end);
-                    loaded.firsts.push(next | SHARED);
-                    loaded.vertices.push(vertex_of(first)?);
-                }
-                continue;
-            }
-            if is_wanted {
-                loaded.firsts.push(next);
-            }
-            for component in 0..count {
-                let number = if is_cluster {
-                    first + walk.member().ok_or_else(|| wrong("a member for every component"))?
-                } else {
-                    first + component
-                };
-                if is_wanted {
-                    loaded.vertices.push(vertex_of(number)?);
-                }
-            }
+            filling.pass(cell, cell_number(cell) & side_bits == side)?;
         }
         if is_whole {
-            if record.surfaces.len() > 1 && record.surfaces.len() != record.offsets.len() {
-                return Err(wrong("a surface for every own edge"));
-            }
-            if record.sources.len() > 1 && record.sources.len() != record.offsets.len() {
-                return Err(wrong("a source for every own edge"));
-            }
-            loaded.surfaces.extend(record.surfaces.iter().map(|surface| surface.to_native()));
-            loaded.sources.extend(record.sources.iter().map(|source| source.to_native()));
+            filling.add_surfaces()?;
         }
-        let first = record.positions.len() as u32;
-        for (number, point) in (first..).zip(record.points.iter()) {
-            loaded.points.push((point.key.to_native(), number));
-            loaded.point_positions.push(moved(point.position.map(|c| c.to_native())));
-        }
-        Ok(loaded)
+        filling.add_points();
+        Ok(filling.loaded)
     }
 
     /// The place in the list of vertices of that of the component that crosses `edge`, of the cell with this
@@ -300,6 +130,130 @@ impl Loaded {
     pub fn point(&self, key: u64) -> Option<(u32, [i32; 3])> {
         let at = self.points.binary_search_by_key(&key, |point| point.0).ok()?;
         Some((self.points[at].1, self.point_positions[at]))
+    }
+}
+
+/// A brick on the way into memory.
+struct Filling<'r> {
+    record: &'r ArchivedCellBrick,
+    key: BrickKey,
+    /// From its min corner to that of the brick that looks, lattice units.
+    shift: [i32; 3],
+    walk: CutWalk<'r>,
+    /// First own edge of the cell to come.
+    offset: usize,
+    /// The vertex of the cluster under way, if it has but one, and where the cluster ends.
+    shared: (u32, usize),
+    loaded: Loaded,
+}
+
+impl<'r> Filling<'r> {
+    fn new(record: &'r ArchivedCellBrick, key: BrickKey, shift: [i32; 3], is_whole: bool) -> Self {
+        let loaded = Loaded::with_room(if is_whole { record.cells.len() } else { 0 });
+        let walk = CutWalk::new(record);
+        let mut filling = Self { record, key, shift, walk, offset: 0, shared: (0, 0), loaded };
+        let above = record.above.as_ref().map(|above| Vertex {
+            number: above.owner.to_native(),
+            position: filling.moved(above.position.map(|c| c.to_native())),
+            cut: CutCell::above(above.level.to_native(), key.position()),
+        });
+        filling.loaded.vertices.extend(above);
+        filling
+    }
+
+    fn moved(&self, position: [i32; 3]) -> [i32; 3] {
+        std::array::from_fn(|a| position[a] + self.shift[a])
+    }
+
+    fn wrong(&self, expected: &'static str) -> ContourError {
+        ContourError::Contradiction { brick: self.key.position(), expected }
+    }
+
+    fn vertex(&self, number: u32, cut: CutCell) -> Result<Vertex, ContourError> {
+        let position = self.record.positions.get(number as usize);
+        let position = position.ok_or_else(|| self.wrong("a position for every vertex"))?;
+        Ok(Vertex { number, position: self.moved(position.map(|c| c.to_native())), cut })
+    }
+
+    /// Passes the next cell, and adds it if it is wanted.
+    #[inline]
+    fn pass(&mut self, cell: u32, is_wanted: bool) -> Result<(), ContourError> {
+        let first_offset = self.offset;
+        self.offset += usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
+        let number = cell_number(cell);
+        let goes_on = self.walk.is_in_one_vertex(number);
+        if !is_wanted && goes_on {
+            return Ok(());
+        }
+        if is_wanted {
+            self.loaded.cells.push(cell);
+            self.loaded.offset_firsts.push(self.loaded.offsets.len() as u32);
+            let own = self.record.offsets.get(first_offset..self.offset);
+            let own = own.ok_or_else(|| self.wrong("an offset for every own edge"))?;
+            self.loaded.offsets.extend(own.iter().map(|offset| offset.to_native()));
+            if goes_on && number < self.shared.1 {
+                self.loaded.firsts.push(self.shared.0 | SHARED);
+                return Ok(());
+            }
+        }
+        self.pass_vertices(cell, is_wanted)
+    }
+
+    /// The same of the vertices of its components.
+    fn pass_vertices(&mut self, cell: u32, is_wanted: bool) -> Result<(), ContourError> {
+        let number = cell_number(cell);
+        let count = u32::from(components_of(cell).count);
+        let (cut, first, is_cluster) = self.walk.step(number, count);
+        let next = self.loaded.vertices.len() as u32;
+        if self.record.above.is_some() {
+            self.loaded.firsts.extend(is_wanted.then_some(SHARED));
+            return Ok(());
+        }
+        if self.walk.is_in_one_vertex(number) {
+            if is_wanted {
+                self.shared = (next, self.walk.end());
+                self.loaded.firsts.push(next | SHARED);
+                self.loaded.vertices.push(self.vertex(first, cut)?);
+            }
+            return Ok(());
+        }
+        self.loaded.firsts.extend(is_wanted.then_some(next));
+        for component in 0..count {
+            let vertex = if is_cluster {
+                let member = self.walk.member();
+                first + member.ok_or_else(|| self.wrong("a member for every component"))?
+            } else {
+                first + component
+            };
+            if is_wanted {
+                self.loaded.vertices.push(self.vertex(vertex, cut)?);
+            }
+        }
+        Ok(())
+    }
+
+    /// What the crossings are, and where they come from.
+    fn add_surfaces(&mut self) -> Result<(), ContourError> {
+        let record = self.record;
+        if record.surfaces.len() > 1 && record.surfaces.len() != record.offsets.len() {
+            return Err(self.wrong("a surface for every own edge"));
+        }
+        if record.sources.len() > 1 && record.sources.len() != record.offsets.len() {
+            return Err(self.wrong("a source for every own edge"));
+        }
+        self.loaded.surfaces.extend(record.surfaces.iter().map(|surface| surface.to_native()));
+        self.loaded.sources.extend(record.sources.iter().map(|source| source.to_native()));
+        Ok(())
+    }
+
+    /// The vertices on its faces.
+    fn add_points(&mut self) {
+        let first = self.record.positions.len() as u32;
+        for (number, point) in (first..).zip(self.record.points.iter()) {
+            self.loaded.points.push((point.key.to_native(), number));
+            let position = self.moved(point.position.map(|c| c.to_native()));
+            self.loaded.point_positions.push(position);
+        }
     }
 }
 

@@ -20,6 +20,7 @@ mod borders;
 mod cell;
 mod cluster;
 mod cut_cell;
+mod cut_walk;
 mod face_points;
 mod far_points;
 mod features;

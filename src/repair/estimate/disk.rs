@@ -253,16 +253,8 @@ impl DiskModel<'_> {
             // Two looks, or the last one and the surface.
             separate: (kept + soup + hits + signs + cells + 2.0 * surface) as u64,
             draw: (kept + soup + hits + signs + cells + surface + drawn + drawing) as u64,
-            write: (kept
-                + soup
-                + hits
-                + signs
-                + cells
-                + surface
-                + drawn
-                + painting
-                + output
-                + aside) as u64,
+            write: (kept + soup + signs + cells + surface + drawn + painting + output + aside)
+                as u64,
             prove: (kept + soup + cells + surface + drawn + output + self.proof()) as u64,
             measure: (kept + soup + output + self.measuring(triangles)) as u64,
         }

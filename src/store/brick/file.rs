@@ -143,6 +143,15 @@ impl BrickFile {
         Ok(view)
     }
 
+    /// Lets all windows go that nobody looks at: nothing of the file is needed for some time.
+    pub fn let_windows_go(&self) {
+        if let Bytes::Mapped { cache, .. } = &self.bytes {
+            let mut cache = cache.lock().unwrap_or_else(PoisonError::into_inner);
+            cache.windows.clear();
+            cache.held_bytes = 0;
+        }
+    }
+
     fn window(
         &self,
         file: &ScratchFile,
