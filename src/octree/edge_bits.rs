@@ -75,6 +75,12 @@ impl EdgeBits {
         self.rows.as_flattened_mut()[row] |= bit;
     }
 
+    /// Sets the bit of the edge at `x` of a row among those of all axes, one after the other.
+    #[inline]
+    pub fn set_in_row(&mut self, row: usize, x: usize) {
+        self.rows.as_flattened_mut()[row] |= 1 << x;
+    }
+
     /// The bit of edge `index`.
     #[must_use]
     #[inline]

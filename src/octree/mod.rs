@@ -10,6 +10,7 @@ mod cell_brick;
 mod domain;
 mod edge_bits;
 mod edge_brick;
+mod edge_walk;
 mod exposed;
 mod flips;
 mod index;
@@ -43,6 +44,7 @@ pub use edge_bits::{
     edge_position,
 };
 pub use edge_brick::{ArchivedEdgeBrick, EdgeBrick, decode_edges};
+pub use edge_walk::EdgeWalk;
 pub use exposed::{BURIED, ExposedPlace, LOST, Touched};
 pub use flips::{FLIPS, Flip, FlipReader, FlipRecord, Flips};
 pub use index::{BrickIndex, Neighbour};

@@ -126,7 +126,7 @@ pub fn build_graph(
         Loaded::default,
         |loaded, item| {
             let _brick = resident.hold(1);
-            let view = loaded.load(hits, &item)?;
+            let view = loaded.load_checked(hits, &item)?;
             let record = view.as_ref().map(|view| decode_hits(view)).transpose()?;
             let mut says = examine(loaded, record, &item);
             if let (FillRule::Nonzero, Some(record)) = (rule, record) {

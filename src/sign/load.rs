@@ -1,6 +1,8 @@
 //! Loads a brick with its flips: marks and barrier as bit planes.
 
-use crate::octree::{BrickKey, EdgeBits, FlipReader, FlipRecord, Flips, HitEdge, decode_hits};
+use crate::octree::{
+    BrickKey, EdgeBits, EdgeWalk, FlipReader, FlipRecord, Flips, HitEdge, decode_hits,
+};
 use crate::sign::SignError;
 use crate::store::{BrickFile, Resources, StoreError, View};
 
@@ -63,27 +65,40 @@ pub struct Loaded {
 }
 
 impl Loaded {
+    /// As [`Self::load`]; checks that no face is odd.
+    pub fn load_checked(
+        &mut self,
+        hits: &BrickFile,
+        item: &LoadItem,
+    ) -> Result<Option<View>, SignError> {
+        let view = self.load(hits, item)?;
+        if !self.marks.is_closed() {
+            let expected = "no odd face after patching";
+            return Err(SignError::Contradiction { brick: item.brick.position(), expected });
+        }
+        Ok(view)
+    }
+
     /// Fills the planes; hands back the record of hits.
     pub fn load(&mut self, hits: &BrickFile, item: &LoadItem) -> Result<Option<View>, SignError> {
         self.marks.clear();
         self.barrier.clear();
         let view = item.hits.map(|number| hits.view(number)).transpose()?;
         if let Some(view) = &view {
+            let mut walk = EdgeWalk::default();
             for edge in decode_hits(view)?.edges.iter() {
                 let edge = HitEdge { bits: edge.bits.to_native(), signed_sum: 0 };
-                self.barrier.set(edge.edge());
+                walk.go_to(edge.edge());
+                let (_, [x, _, _]) = walk.position();
+                self.barrier.set_in_row(walk.row(), x);
                 if edge.class() & 1 == 1 {
-                    self.marks.set(edge.edge());
+                    self.marks.set_in_row(walk.row(), x);
                 }
             }
         }
         for flip in &item.flips {
             self.marks.toggle(flip.edge);
             self.barrier.set(flip.edge);
-        }
-        if !self.marks.is_closed() {
-            let expected = "no odd face after patching";
-            return Err(SignError::Contradiction { brick: item.brick.position(), expected });
         }
         Ok(view)
     }

@@ -9,7 +9,8 @@ use memmap2::{Mmap, MmapOptions};
 
 use crate::store::{ScratchFile, StoreError};
 
-/// Maps `len` bytes at `offset` for reading, with their pages present.
+/// Maps `len` bytes at `offset` for reading. Pages come as they are looked at: to ask for all at once takes
+/// longer.
 ///
 /// # Errors
 /// [`StoreError::Damaged`] when the file is shorter than that; or the map is refused.
@@ -21,6 +22,6 @@ pub fn map(file: &ScratchFile, offset: u64, len: usize) -> Result<Mmap, StoreErr
     }
     // SAFETY: the file is ours alone (the work folder is locked), its blocks exist, the length was checked,
     // and nobody truncates a scratch file in use.
-    unsafe { MmapOptions::new().offset(offset).len(len).populate().map(file.file()) }
+    unsafe { MmapOptions::new().offset(offset).len(len).map(file.file()) }
         .map_err(|e| StoreError::io("map", file.path(), e))
 }

@@ -21,8 +21,8 @@ use crate::contour::mdc::patch_surfaces::PatchSurfaces;
 use crate::contour::{ContourOptions, Method, SurfaceDetail};
 use crate::geom::qef::QefOptions;
 use crate::octree::{
-    Border, CornerBits, Crossing, Domain, EdgeBits, LINES, NO_SOURCE, PATCH, ROWS, SIDE,
-    SignRecord, SourcePlane, edge_position, surface_of,
+    Border, CornerBits, Crossing, Domain, EdgeBits, EdgeWalk, LINES, NO_SOURCE, PATCH, ROWS, SIDE,
+    SignRecord, SourcePlane, surface_of,
 };
 
 /// A crossing as the cells around it need it.
@@ -161,15 +161,16 @@ impl Workspace {
         self.normals.push(DVec3::ZERO);
         self.normals.extend(self.planes.iter().map(SourcePlane::unit_normal));
         self.is_smooth = self.spans_less_than_a_crease();
+        let mut walk = EdgeWalk::default();
         record.each_crossing(|Crossing { edge, plane }| {
-            self.marks.set(edge);
-            let here = edge as usize / LINES;
-            while row <= here {
+            walk.go_to(edge);
+            let (axis, at) = walk.position();
+            self.marks.set_in_row(walk.row(), at[0]);
+            while row <= walk.row() {
                 self.row_starts[row] = self.crossings.len() as u32;
                 row += 1;
             }
             self.crossings.push(if plane & PATCH == 0 {
-                let (axis, at) = edge_position(edge);
                 let offset = self.planes[plane as usize].offset_on_edge(axis, at, cell_units);
                 let SourcePlane { material, source, .. } = self.planes[plane as usize];
                 let surface = surface_of(material).bits();
