@@ -313,7 +313,12 @@ fn numbers_within_a_brick_are_as_documented() {
 fn hit_bricks_are_as_documented() {
     let plane = SourcePlane { normal: [0.0, 0.0, 1.0], ..SourcePlane::default() };
     let edge = HitEdge::new(107_810, 3, MAX_HITS, -2);
-    assert_eq!(edge.bits, 107_810 | 3 << 17 | 3 << 19);
+    assert_eq!(edge.bits, 107_810 | 3 << 17 | 3 << 19 | 0x7fe << 21);
+    assert_eq!((edge.edge(), edge.class(), edge.kept(), edge.signed_sum()), (107_810, 3, 3, -2));
+    for (sum, kept) in [(1, 1), (-1, -1), (1023, 1023), (-1024, -1023), (i16::MAX, 1023)] {
+        assert_eq!(HitEdge::new(0, 1, 1, sum).signed_sum(), kept);
+    }
+    says("HitBrick", "from -1023 to 1023, in two's complement");
     says("HitBrick", "bits  0..16  edge number");
     says("HitBrick", "bits 17..18  count class");
     says("HitBrick", "bits 19..20  kept hits, at most 3");
@@ -325,7 +330,7 @@ fn hit_bricks_are_as_documented() {
     let brick = HitBrick { edges: vec![edge], hits: vec![0, 0, 0], planes: vec![plane] };
     let bytes = encode(&brick);
     let archived = decode_hits(&bytes).expect("what was written validates");
-    assert_eq!(size_of_val(&archived.edges[0]), 8);
+    assert_eq!(size_of_val(&archived.edges[0]), 4);
     assert_eq!(size_of_val(&archived.hits[0]), 4);
     assert_eq!(size_of_val(&archived.planes[0]), stated_size("SourcePlane"));
     check_record::<SourcePlane>("SourcePlane", &[0, 8, 20, 24, 28]);

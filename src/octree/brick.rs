@@ -80,17 +80,28 @@ impl From<&ArchivedSourcePlane> for SourcePlane {
 /// An edge that was hit.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Archive, Serialize, Deserialize)]
 pub struct HitEdge {
-    /// Edge number (17 bits), count class (2 bits at 17), number of kept hits (2 bits at 19).
+    /// Edge number (17 bits), count class (2 bits at 17), number of kept hits (2 bits at 19), and
+    /// [`Self::signed_sum`] (11 bits at 21).
     pub bits: u32,
-    /// Sum over all hits: +1 where the triangle faces up the axis, -1 where down; clamped.
-    pub signed_sum: i16,
 }
+
+/// Where the signed sum begins in the bits of an edge that was hit.
+const SIGNED_SUM: u32 = 21;
+/// Sums that are larger, up or down, are kept as this one.
+const MOST_SIGNED_SUM: i16 = 1023;
 
 impl HitEdge {
     /// Packs an edge number, a count class and a number of kept hits.
     #[must_use]
     pub fn new(edge: u32, class: u32, kept: usize, signed_sum: i16) -> Self {
-        Self { bits: edge | class << 17 | (kept as u32) << 19, signed_sum }
+        let sum = i32::from(signed_sum.clamp(-MOST_SIGNED_SUM, MOST_SIGNED_SUM));
+        Self { bits: edge | class << 17 | (kept as u32) << 19 | (sum as u32) << SIGNED_SUM }
+    }
+
+    /// Sum over all hits: +1 where the triangle faces up the axis, -1 where down; clamped.
+    #[must_use]
+    pub const fn signed_sum(self) -> i16 {
+        (self.bits as i32 >> SIGNED_SUM) as i16
     }
 
     /// The count class after one more hit. 0, 1, then 2 (even, more than none), 3 (odd, more than
@@ -171,7 +182,7 @@ pub(crate) const ROOT_BYTES: usize = 96;
 
 impl ArchiveSize for HitBrick {
     fn archive_bytes(&self) -> usize {
-        8 * self.edges.len() + 4 * self.hits.len() + 32 * self.planes.len() + ROOT_BYTES
+        4 * (self.edges.len() + self.hits.len()) + 32 * self.planes.len() + ROOT_BYTES
     }
 }
 
@@ -218,7 +229,7 @@ pub fn decode_hits(bytes: &[u8]) -> Result<&ArchivedHitBrick, BrickError> {
         .map_err(|source| BrickError::Invalid { kind, source })?;
     let mut kept = 0;
     for edge in brick.edges.iter() {
-        let edge = HitEdge { bits: edge.bits.to_native(), signed_sum: 0 };
+        let edge = HitEdge { bits: edge.bits.to_native() };
         if edge.edge() >= 3 * AXIS_EDGES {
             return Err(out_of_range(kind, "edge", edge.edge().into(), (3 * AXIS_EDGES).into()));
         }

@@ -178,7 +178,7 @@ impl<'v> SignRecord<'v> {
     #[inline]
     pub fn each_crossing_within(&self, [first, end]: [u32; 2], mut visit: impl FnMut(Crossing)) {
         if let Some(hits) = self.hits {
-            let edge_of = |bits: u32_le| HitEdge { bits: bits.to_native(), signed_sum: 0 }.edge();
+            let edge_of = |bits: u32_le| HitEdge { bits: bits.to_native() }.edge();
             let start = hits.edges.partition_point(|edge| edge_of(edge.bits) < first);
             let edges = hits.edges[start..].iter().map(|edge| edge_of(edge.bits));
             for (edge, plane) in edges.take_while(|edge| *edge < end).zip(&hits.hits[start..]) {

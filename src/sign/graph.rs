@@ -207,8 +207,7 @@ fn votes_of(
     let mut flips = flips.iter().peekable();
     let mut votes: BTreeMap<([u16; 2], i16), u32> = BTreeMap::new();
     for edge in brick.edges.iter() {
-        let signed_sum = edge.signed_sum.to_native();
-        let edge = HitEdge { bits: edge.bits.to_native(), signed_sum };
+        let edge = HitEdge { bits: edge.bits.to_native() };
         while flips.next_if(|flip| flip.edge < edge.edge()).is_some() {}
         let is_patched = flips.peek().is_some_and(|flip| flip.edge == edge.edge());
         let (axis, at) = edge_position(edge.edge());
@@ -219,7 +218,7 @@ fn votes_of(
         beyond[axis] += 1;
         let ends = [regions.at(at), regions.at(beyond)];
         // A triangle that faces up the axis has the inside below it.
-        *votes.entry((ends, -signed_sum)).or_default() += 1;
+        *votes.entry((ends, -edge.signed_sum())).or_default() += 1;
     }
     votes.into_iter().map(|((ends, delta), count)| (ends, delta, count)).collect()
 }

@@ -41,8 +41,7 @@ impl PanesSay {
         let mut votes: BTreeMap<([u16; 2], i16), u32> = BTreeMap::new();
         let mut first = 0;
         for edge in record.edges.iter() {
-            let signed_sum = edge.signed_sum.to_native();
-            let edge = HitEdge { bits: edge.bits.to_native(), signed_sum };
+            let edge = HitEdge { bits: edge.bits.to_native() };
             let hits = &record.hits[first..first + edge.kept()];
             first += edge.kept();
             while flips.next_if(|flip| flip.edge < edge.edge()).is_some() {}
@@ -59,7 +58,7 @@ impl PanesSay {
             beyond[axis] += 1;
             let ends = [regions.at(at), regions.at(beyond)];
             if ends[0] != ends[1] {
-                *votes.entry((ends, -signed_sum)).or_default() += 1;
+                *votes.entry((ends, -edge.signed_sum())).or_default() += 1;
             }
         }
         let votes = votes.into_iter().map(|((ends, delta), count)| (ends, delta, count));

@@ -278,7 +278,7 @@ fn contradiction(item: &RelabelItem, expected: &'static str) -> SignError {
 }
 
 fn hit_edge(bits: &rkyv::rend::u32_le) -> HitEdge {
-    HitEdge { bits: bits.to_native(), signed_sum: 0 }
+    HitEdge { bits: bits.to_native() }
 }
 
 /// Walks the hit edges of a record.

@@ -40,7 +40,7 @@ const JOINT_BYTES: f64 = 12.0;
 const LABEL_BYTES: f64 = 4.0;
 const SHEET_BYTES: f64 = 80.0;
 /// Records of bricks: what an edge, a kept hit, a plane, a crossing and a vertex take.
-const HIT_EDGE_BYTES: f64 = 8.0;
+const HIT_EDGE_BYTES: f64 = 4.0;
 const KEPT_HIT_BYTES: f64 = 4.0;
 const PLANE_BYTES: f64 = 32.0;
 const CROSSING_BYTES: f64 = 8.0;
