@@ -14,6 +14,7 @@ mod exposed;
 mod exterior;
 mod flooded;
 mod graph;
+mod hit_edges;
 mod load;
 mod panes;
 mod parity;

@@ -3,10 +3,11 @@
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     AS_HIT, ArchivedHitBrick, Border, CORNER_ROW, CornerBits, Crossing, Domain, EdgeBits,
-    FlipRecord, Flips, HitEdge, LINES, NO_PLANE, PATCH, ROWS, SIDE, SignBrick, SourcePlane,
-    decode_borders, decode_hits, edge_position, encode, find_regions,
+    FlipRecord, Flips, LINES, PATCH, ROWS, SIDE, SignBrick, SourcePlane, decode_borders,
+    decode_hits, edge_position, encode, find_regions,
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
+use crate::sign::hit_edges::{HitEdges, PlanePicker, hit_edge};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::tips::{apart, find_tips};
 use crate::sign::walls::find_walls;
@@ -275,71 +276,4 @@ impl Workspace {
 
 fn contradiction(item: &RelabelItem, expected: &'static str) -> SignError {
     SignError::Contradiction { brick: item.load.brick.position(), expected }
-}
-
-fn hit_edge(bits: &rkyv::rend::u32_le) -> HitEdge {
-    HitEdge { bits: bits.to_native() }
-}
-
-/// Walks the hit edges of a record.
-struct HitEdges<'r> {
-    record: Option<&'r ArchivedHitBrick>,
-    next: usize,
-    first_hit: usize,
-}
-
-impl<'r> HitEdges<'r> {
-    fn new(record: Option<&'r ArchivedHitBrick>) -> Self {
-        Self { record, next: 0, first_hit: 0 }
-    }
-
-    fn peek(&self) -> Option<HitEdge> {
-        Some(hit_edge(&self.record?.edges.get(self.next)?.bits))
-    }
-
-    fn advance(&mut self, edge: HitEdge) -> &'r [rkyv::rend::u32_le] {
-        let range = self.first_hit..self.first_hit + edge.kept();
-        self.next += 1;
-        self.first_hit = range.end;
-        self.record.map_or(&[], |record| &record.hits[range])
-    }
-
-    fn next_below(&mut self, limit: u32) -> Option<(u32, &'r [rkyv::rend::u32_le])> {
-        let edge = self.peek().filter(|edge| edge.edge() < limit)?;
-        Some((edge.edge(), self.advance(edge)))
-    }
-
-    fn next_at(&mut self, wanted: u32) -> Option<&'r [rkyv::rend::u32_le]> {
-        let edge = self.peek().filter(|edge| edge.edge() == wanted)?;
-        Some(self.advance(edge)).filter(|hits| !hits.is_empty())
-    }
-}
-
-/// Keeps the planes that are used, in their old order.
-struct PlanePicker<'r> {
-    record: Option<&'r ArchivedHitBrick>,
-    used: Vec<u32>,
-}
-
-impl<'r> PlanePicker<'r> {
-    fn new(record: Option<&'r ArchivedHitBrick>) -> Self {
-        Self { record, used: vec![NO_PLANE; record.map_or(0, |r| r.planes.len())] }
-    }
-
-    fn pick(&mut self, plane: rkyv::rend::u32_le) -> u32 {
-        self.used[plane.to_native() as usize] = 0;
-        plane.to_native()
-    }
-
-    fn finish(mut self, crossings: &mut [Crossing]) -> Vec<SourcePlane> {
-        let mut planes = Vec::new();
-        for (old, new) in self.used.iter_mut().enumerate().filter(|(_, new)| **new != NO_PLANE) {
-            *new = planes.len() as u32;
-            planes.extend(self.record.map(|record| SourcePlane::from(&record.planes[old])));
-        }
-        for crossing in crossings.iter_mut().filter(|crossing| crossing.plane & PATCH == 0) {
-            crossing.plane = self.used[crossing.plane as usize];
-        }
-        planes
-    }
 }

@@ -11,7 +11,7 @@
 
 use glam::DVec3;
 
-use crate::contour::mdc::blocks::BlockPlanes;
+use crate::contour::mdc::block_planes::BlockPlanes;
 use crate::contour::mdc::cluster::{Block, CellPlane};
 use crate::contour::mdc::workspace::Workspace;
 use crate::octree::SIDE;

@@ -17,8 +17,9 @@ use std::ops::RangeInclusive;
 
 use glam::DVec3;
 
+use crate::contour::mdc::block_planes::BlockPlanes;
 use crate::contour::mdc::cell::place_of;
-use crate::contour::mdc::cluster::{Block, BlockPlace, EdgeCounts, Group, disk_in_block};
+use crate::contour::mdc::cluster::{Block, BlockPlace, EdgeCounts, disk_in_block};
 use crate::contour::mdc::features::Place;
 use crate::contour::mdc::plain::later;
 use crate::contour::mdc::workspace::{EdgeCrossing, Workspace};
@@ -27,75 +28,6 @@ use crate::octree::{CellBrick, LINES, ROWS, SIDE};
 
 /// Blocks with fewer cells are left to these.
 const FEWEST_CELLS: u32 = 4;
-
-/// The crossings of a block, plane by plane.
-#[derive(Default)]
-pub(super) struct BlockPlanes {
-    /// Which block this is: one more for every one.
-    block: u32,
-    /// Of every plane, by the number of its normal, the last block that has it and its rank there.
-    seen: Vec<[u32; 2]>,
-    /// The planes of the block.
-    own: Vec<Group>,
-    /// Numbers of the normals on edges that leave it, but for those that were own planes before.
-    leaving: Vec<u32>,
-}
-
-/// In place of a rank: of a plane on edges that leave the block only.
-const LEAVES: u32 = u32::MAX;
-
-impl BlockPlanes {
-    /// Goes on with another block.
-    fn begin(&mut self) {
-        self.own.clear();
-        self.leaving.clear();
-        self.block = self.block.checked_add(1).unwrap_or_else(|| {
-            self.seen.fill([0; 2]);
-            1
-        });
-    }
-
-    /// Whether a plane is of the block or of an edge that leaves it.
-    #[inline]
-    pub(super) fn has(&self, number: u32) -> bool {
-        self.seen.get(number as usize).is_some_and(|seen| seen[0] == self.block)
-    }
-
-    /// Where it is noted that a plane was seen.
-    #[inline]
-    fn seen(&mut self, number: u32) -> &mut [u32; 2] {
-        let number = number as usize;
-        if number >= self.seen.len() {
-            self.seen.resize(number + 1, [0; 2]);
-        }
-        &mut self.seen[number]
-    }
-
-    /// Adds a crossing of the block.
-    #[inline]
-    fn add(&mut self, number: u32, point: DVec3) {
-        let (block, next) = (self.block, self.own.len() as u32);
-        let seen = self.seen(number);
-        let [last, mut rank] = *seen;
-        if last != block || rank == LEAVES {
-            rank = next;
-            *seen = [block, rank];
-            self.own.push(Group::of_plane(number - 1));
-        }
-        self.own[rank as usize].add_point(point);
-    }
-
-    /// Notes the plane of an edge that leaves the block.
-    #[inline]
-    fn note(&mut self, number: u32) {
-        let block = self.block;
-        let seen = self.seen(number);
-        if seen[0] != block {
-            *seen = [block, LEAVES];
-            self.leaving.push(number);
-        }
-    }
-}
 
 impl Workspace {
     /// Takes a block in, with the cells in it that `touched` has bits for, in Morton order; whether it could.

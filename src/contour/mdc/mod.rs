@@ -15,6 +15,7 @@ mod arcs;
 mod around_cell;
 mod around_edge;
 mod block_creases;
+mod block_planes;
 mod blocks;
 mod borders;
 mod cell;

@@ -11,7 +11,7 @@ use std::collections::HashMap;
 use glam::DVec3;
 
 use crate::contour::mdc::INSET_UNITS;
-use crate::contour::mdc::blocks::BlockPlanes;
+use crate::contour::mdc::block_planes::BlockPlanes;
 use crate::contour::mdc::cell::number_at;
 use crate::contour::mdc::cluster::{ClusterOptions, Clustering, Leaves};
 use crate::contour::mdc::features::Halo;
