@@ -149,12 +149,12 @@ where
         let brick = self.cells.key(number).position();
         let vertices = (self.cells.flags(number) & VERTICES) as usize;
         let base = brick.map(|c| i64::from(c) * self.domain.brick_units());
-        self.cells.read(number, |record| {
-            if record.positions.len() + record.points.len() != vertices {
+        self.cells.read_with_points(number, |record, points| {
+            if record.positions.len() + points.len() != vertices {
                 let expected = "as many vertices as the directory says";
                 return Err(ContourError::Contradiction { brick, expected });
             }
-            let on_faces = record.points.iter().map(|point| &point.position);
+            let on_faces = points.iter().map(|point| &point.position);
             positions.clear();
             positions.extend(record.positions.iter().chain(on_faces).map(|position| {
                 let at = std::array::from_fn(|a| base[a] + i64::from(position[a].to_native()));

@@ -35,8 +35,8 @@ pub use brick::{
     encode,
 };
 pub use cell_brick::{
-    Above, ArchivedCellBrick, CellBrick, FacePoint, Facet, MAX_LEVEL, NO_SOURCE, Summary,
-    VertexReach, cluster_over, decode_cells,
+    Above, ArchivedCellBrick, ArchivedFacePoint, CellBrick, FacePoint, Facet, MAX_LEVEL, NO_SOURCE,
+    Summary, VertexReach, cluster_over, decode_cells,
 };
 pub use domain::{Domain, LATTICE_BITS, MIN_CELL_UNITS, SnapBox};
 pub use edge_bits::{

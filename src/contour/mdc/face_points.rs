@@ -2,7 +2,7 @@
 //!
 //! In:         bricks of cells whose flags and vertices are final.
 //! Out:        those bricks that changed since they were placed, with the vertices on the faces
-//!             that they own, which are those below their cells.
+//!             that they own, which are those below their cells; of the others these vertices only.
 //! Invariant:  a face point stands where its arc leaves its face, halfway between the two crossings
 //!             there; it depends on the arc alone, so both polygons that have it see the same.
 //! Units:      lattice units from the brick's min corner.
@@ -15,9 +15,9 @@ use crate::contour::mdc::cell::{cell_number, edge_below, place_of, segments_on};
 use crate::contour::mdc::far_points::FarPoints;
 use crate::contour::mdc::layers::Layers;
 use crate::contour::mdc::neighbourhood::Neighbourhood;
-use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, HAS_GRANTED, flags_of};
+use crate::contour::mdc::{HAS_CLUSTERS, HAS_FLAGGED, HAS_GRANTED, HAS_POINTS_ONLY, flags_of};
 use crate::contour::{ContourError, ContourStats, SURFACE};
-use crate::octree::{Domain, FacePoint, encode};
+use crate::octree::{CellBrick, Domain, FacePoint, encode};
 use crate::store::{BrickFile, BrickWriter, Resources};
 
 /// What a byte of a record takes while its face points are sought.
@@ -46,15 +46,23 @@ pub fn add(
             if points.is_empty() && !layers.is_anew(number) {
                 return Ok(None);
             }
-            let mut brick = layers.read(number, |record| Ok(record.to_brick()))?;
+            let count = points.len() as u32;
+            let is_anew = layers.is_anew(number);
+            let mut brick = CellBrick::default();
+            if is_anew {
+                brick = layers.read(number, |record| Ok(record.to_brick()))?;
+            }
             brick.points = points;
-            let flagged = brick.flagged.len() as u64;
-            let points = brick.points.len() as u64;
-            let flags = flags_of(&brick);
-            Ok(Some((layers.key(number), flags, encode(&brick), flagged, points)))
+            let flags = if is_anew {
+                flags_of(&brick)
+            } else {
+                (layers.flags(number) + count) | HAS_POINTS_ONLY
+            };
+            let counts = [brick.flagged.len() as u64, count.into()];
+            Ok(Some((layers.key(number), flags, encode(&brick), counts)))
         },
         |made| {
-            let Some((key, flags, bytes, flagged, points)) = made else { return Ok(()) };
+            let Some((key, flags, bytes, [flagged, points])) = made else { return Ok(()) };
             stats.flagged_cells += flagged;
             stats.face_points += points;
             Ok(writer.append(key.0, flags, &bytes)?)

@@ -1,9 +1,15 @@
-//! The bricks of cells, and behind them those that a later step has made anew.
+//! The bricks of cells, and behind them those that a later step has made anew, or their face points only.
 
 use crate::contour::ContourError;
+use crate::contour::mdc::HAS_POINTS_ONLY;
 use crate::monitor::{Gauge, Resident};
-use crate::octree::{ArchivedCellBrick, BrickKey, decode_cells};
+use crate::octree::{ArchivedCellBrick, ArchivedFacePoint, BrickKey, decode_cells};
 use crate::store::{BrickFile, Resources, StoreError, View, ordered_by_weight};
+
+/// Whether a record has nothing but face points.
+fn has_points_only(file: &BrickFile, number: usize) -> bool {
+    file.directory()[number].flags & HAS_POINTS_ONLY != 0
+}
 
 /// Bricks of cells by the numbers that they have in the first file; a brick of the second file
 /// stands for the one of the first with its key.
@@ -39,33 +45,42 @@ impl<'f> Layers<'f> {
         self.first.find(key.0)
     }
 
-    fn file_of(&self, number: usize) -> (&'f BrickFile, usize) {
-        let key = self.first.directory()[number].key;
-        match self.anew.and_then(|anew| Some((anew, anew.find(key)?))) {
-            Some(found) => found,
-            None => (self.first, number),
-        }
+    /// The record of a brick in the second file.
+    fn anew(&self, number: usize) -> Option<(&'f BrickFile, usize)> {
+        let anew = self.anew?;
+        Some((anew, anew.find(self.first.directory()[number].key)?))
+    }
+
+    /// Its record there, if that has its face points only.
+    fn points_of(&self, number: usize) -> Option<(&'f BrickFile, usize)> {
+        self.anew(number).filter(|(file, number)| has_points_only(file, *number))
+    }
+
+    /// Its record but for its face points.
+    fn cells_of(&self, number: usize) -> (&'f BrickFile, usize) {
+        let whole = self.anew(number).filter(|(file, number)| !has_points_only(file, *number));
+        whole.unwrap_or((self.first, number))
     }
 
     /// What the directory says of a brick.
     pub fn flags(&self, number: usize) -> u32 {
-        let (file, number) = self.file_of(number);
+        let (file, number) = self.anew(number).unwrap_or((self.first, number));
         file.directory()[number].flags
     }
 
-    /// Whether a brick was made anew.
+    /// Whether a brick was made anew, with more than its face points.
     pub fn is_anew(&self, number: usize) -> bool {
-        let key = self.first.directory()[number].key;
-        self.anew.is_some_and(|anew| anew.find(key).is_some())
+        self.anew(number).is_some_and(|(file, number)| !has_points_only(file, number))
     }
 
-    /// The length of a brick's record.
+    /// The length of a brick's records.
     pub fn record_bytes(&self, number: usize) -> u64 {
-        let (file, number) = self.file_of(number);
-        file.record_bytes(number)
+        let points = self.points_of(number).map_or(0, |(file, number)| file.record_bytes(number));
+        let (file, number) = self.cells_of(number);
+        file.record_bytes(number) + points
     }
 
-    /// The record of a brick.
+    /// The record of a brick, whose face points may be missing.
     ///
     /// # Errors
     /// [`ContourError`].
@@ -74,9 +89,26 @@ impl<'f> Layers<'f> {
         number: usize,
         use_it: impl FnOnce(&ArchivedCellBrick) -> Result<R, ContourError>,
     ) -> Result<R, ContourError> {
-        let (file, number) = self.file_of(number);
+        let (file, number) = self.cells_of(number);
         let view: View = file.view(number)?;
         use_it(decode_cells(&view)?)
+    }
+
+    /// The record of a brick, and its face points.
+    ///
+    /// # Errors
+    /// [`ContourError`].
+    pub fn read_with_points<R>(
+        &self,
+        number: usize,
+        use_it: impl FnOnce(&ArchivedCellBrick, &[ArchivedFacePoint]) -> Result<R, ContourError>,
+    ) -> Result<R, ContourError> {
+        let Some((file, of_points)) = self.points_of(number) else {
+            return self.read(number, |record| use_it(record, &record.points));
+        };
+        let view = file.view(of_points)?;
+        let points = &decode_cells(&view)?.points;
+        self.read(number, |record| use_it(record, points))
     }
 
     /// Visits the bricks that are wanted on all threads, and takes what comes of them in their

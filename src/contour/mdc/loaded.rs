@@ -8,7 +8,7 @@ use crate::contour::mdc::cut_cell::CutCell;
 use crate::contour::mdc::cut_walk::CutWalk;
 use crate::contour::mdc::table::NO_COMPONENT;
 use crate::mesh::Surface;
-use crate::octree::{ArchivedCellBrick, BrickKey, SIDE};
+use crate::octree::{ArchivedCellBrick, ArchivedFacePoint, BrickKey, SIDE};
 
 /// A vertex of a brick.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,7 @@ impl Loaded {
     /// # Errors
     /// [`ContourError::Contradiction`].
     pub fn new(
-        record: &ArchivedCellBrick,
+        (record, points): (&ArchivedCellBrick, &[ArchivedFacePoint]),
         key: BrickKey,
         steps: [i32; 3],
         brick_units: i64,
@@ -69,7 +69,7 @@ impl Loaded {
         if is_whole {
             filling.add_surfaces()?;
         }
-        filling.add_points();
+        filling.add_points(points);
         Ok(filling.loaded)
     }
 
@@ -247,9 +247,9 @@ impl<'r> Filling<'r> {
     }
 
     /// The vertices on its faces.
-    fn add_points(&mut self) {
+    fn add_points(&mut self, points: &[ArchivedFacePoint]) {
         let first = self.record.positions.len() as u32;
-        for (number, point) in (first..).zip(self.record.points.iter()) {
+        for (number, point) in (first..).zip(points) {
             self.loaded.points.push((point.key.to_native(), number));
             let position = self.moved(point.position.map(|c| c.to_native()));
             self.loaded.point_positions.push(position);

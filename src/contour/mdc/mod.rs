@@ -70,6 +70,9 @@ const IS_IN_ABOVE: u32 = 1 << 27;
 const HAS_REACHES: u32 = 1 << 26;
 /// In the flags of a brick of cells: vertices do.
 const HAS_GRANTED: u32 = 1 << 25;
+/// In the flags of a brick of cells that was made anew: its record has nothing but its face points, and all else
+/// is as it was.
+const HAS_POINTS_ONLY: u32 = 1 << 24;
 
 /// What the directory says of a brick of cells.
 fn flags_of(brick: &CellBrick) -> u32 {

@@ -114,7 +114,9 @@ impl<'f> Neighbourhood<'f> {
         self.bricks = [const { None }; 27];
         self.numbers = [usize::MAX; 27];
         let (key, units) = (self.key, self.domain.brick_units());
-        let own = self.layers.read(number, |record| Loaded::new(record, key, [0; 3], units))?;
+        let own = self.layers.read_with_points(number, |record, points| {
+            Loaded::new((record, points), key, [0; 3], units)
+        })?;
         self.ranks.fill(NO_RANK);
         for (rank, &cell) in own.cells.iter().enumerate() {
             self.ranks[cell_number(cell)] = rank as u16;
@@ -158,8 +160,9 @@ impl<'f> Neighbourhood<'f> {
             let Some(key) = brick_around(self.key, slot) else { return Ok(None) };
             let Some(number) = self.layers.find(key) else { return Ok(None) };
             let units = self.domain.brick_units();
-            let loaded =
-                self.layers.read(number, |record| Loaded::new(record, key, steps, units))?;
+            let loaded = self.layers.read_with_points(number, |record, points| {
+                Loaded::new((record, points), key, steps, units)
+            })?;
             self.bricks[slot] = Some(loaded);
             self.numbers[slot] = number;
         }
@@ -293,10 +296,10 @@ impl<'f> Neighbourhood<'f> {
     ) -> Result<Option<(u32, [i32; 3])>, ContourError> {
         let (here, there) = (self.key.position(), self.layers.key(owner).position());
         let units = self.domain.brick_units() as i32;
-        self.layers.read(owner, |record| {
-            let found = record.points.binary_search_by_key(&key, |point| point.key.to_native());
+        self.layers.read_with_points(owner, |record, points| {
+            let found = points.binary_search_by_key(&key, |point| point.key.to_native());
             Ok(found.ok().map(|at| {
-                let position = record.points[at].position.map(|c| c.to_native());
+                let position = points[at].position.map(|c| c.to_native());
                 let place = std::array::from_fn(|a| {
                     position[a] + (there[a] as i32 - here[a] as i32) * units
                 });
