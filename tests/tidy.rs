@@ -81,6 +81,7 @@ const HOMES: [(&str, &[&str]); 30] = [
             "octree/sign_bricks.rs",
             // These hand on the aligned bytes that `encode` returns.
             "scan/mod.rs",
+            "sign/hit_edges.rs",
             "sign/relabel.rs",
             "sign/exposed.rs",
             "sign/panes.rs",
