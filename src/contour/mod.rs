@@ -31,7 +31,7 @@ mod write;
 use serde::{Deserialize, Serialize};
 
 use crate::mesh::Surface;
-use crate::octree::{BrickError, Domain, SignBrickError, SignBricks};
+use crate::octree::{BrickError, Domain, SignBricks};
 use crate::store::{BrickFile, BrickWriter, Resources, StoreError};
 
 pub use count::count_triangles;
@@ -147,9 +147,6 @@ pub enum ContourError {
     /// A brick's record is not what its stage writes.
     #[error(transparent)]
     Brick(#[from] BrickError),
-    /// A brick of signs cannot be read.
-    #[error(transparent)]
-    Signs(SignBrickError),
     /// Two bricks contradict each other: a bug, or a disk that lies.
     #[error("Brick {brick:?}: expected {expected}, found otherwise")]
     Contradiction {
@@ -158,16 +155,6 @@ pub enum ContourError {
         /// What holds for every sound set of bricks.
         expected: &'static str,
     },
-}
-
-impl From<SignBrickError> for ContourError {
-    fn from(error: SignBrickError) -> Self {
-        match error {
-            SignBrickError::Store(error) => Self::Store(error),
-            SignBrickError::Brick(error) => Self::Brick(error),
-            other => Self::Signs(other),
-        }
-    }
 }
 
 impl ContourError {

@@ -36,6 +36,9 @@ pub enum BrickError {
         /// What the validation found.
         source: BoxedError,
     },
+    /// The brick is as it was hit, and its hits are missing.
+    #[error("A sign brick is as it was hit, and there are no hits of it")]
+    NoHits,
     /// A field is out of its range.
     #[error("A {kind} brick has {field} {found}, the limit is {limit}")]
     OutOfRange {
@@ -83,6 +86,13 @@ pub struct HitEdge {
     /// Edge number (17 bits), count class (2 bits at 17), number of kept hits (2 bits at 19), and
     /// [`Self::signed_sum`] (11 bits at 21).
     pub bits: u32,
+}
+
+impl From<&ArchivedHitEdge> for HitEdge {
+    #[inline]
+    fn from(archived: &ArchivedHitEdge) -> Self {
+        Self { bits: archived.bits.to_native() }
+    }
 }
 
 /// Where the signed sum begins in the bits of an edge that was hit.
@@ -229,7 +239,7 @@ pub fn decode_hits(bytes: &[u8]) -> Result<&ArchivedHitBrick, BrickError> {
         .map_err(|source| BrickError::Invalid { kind, source })?;
     let mut kept = 0;
     for edge in brick.edges.iter() {
-        let edge = HitEdge { bits: edge.bits.to_native() };
+        let edge = HitEdge::from(edge);
         if edge.edge() >= 3 * AXIS_EDGES {
             return Err(out_of_range(kind, "edge", edge.edge().into(), (3 * AXIS_EDGES).into()));
         }

@@ -53,7 +53,7 @@ pub use lost::LostHits;
 pub use occupancy::{InsideCorners, Occupancy};
 pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
-pub use sign_bricks::{AS_HIT, SignBrickError, SignBricks, SignRecord, SignView};
+pub use sign_bricks::{AS_HIT, SignBricks, SignRecord, SignView};
 pub use soup_edges::{BorderUse, MOST_USES, Panes, SoupEdges, TrianglePair, each_border};
 pub use soup_spool::{NarrowTriangle, SoupReader, SoupSpool, SoupWriter};
 pub use touch::for_each_touched_brick;

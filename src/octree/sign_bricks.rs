@@ -6,7 +6,7 @@
 //!             together one by one.
 //! Units:      as [`SignBrick`](crate::octree::SignBrick).
 //! Memory:     the two records of a brick, mapped.
-//! Fails:      [`SignBrickError`]: a record cannot be read, or the hits of a brick are missing.
+//! Fails:      a record cannot be read, or the hits of a brick are missing.
 
 use rkyv::rend::u32_le;
 
@@ -19,24 +19,6 @@ use crate::store::{BrickFile, StoreError, View};
 
 /// Flag in the directory of signs: crossings and planes are those of the record of hits.
 pub const AS_HIT: u32 = 1;
-
-/// Why a brick of signs cannot be read.
-#[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
-pub enum SignBrickError {
-    /// The store fails.
-    #[error(transparent)]
-    Store(#[from] StoreError),
-    /// A record is not what its stage writes.
-    #[error(transparent)]
-    Brick(#[from] BrickError),
-    /// The brick is as it was hit, and there are no hits of it.
-    #[error("Brick {brick:?}: expected one hit of every edge, found other hits or none")]
-    NoHits {
-        /// Position of the brick.
-        brick: [u32; 3],
-    },
-}
 
 /// All bricks of signs.
 #[derive(Clone, Copy)]
@@ -89,28 +71,25 @@ impl<'f> SignBricks<'f> {
         self.signs.record_bytes(number) + hits
     }
 
+    /// Whether a brick is as it was hit.
+    fn is_as_hit(&self, number: usize) -> bool {
+        self.signs.directory()[number].flags & AS_HIT != 0
+    }
+
     /// The record of hits of a brick that is as it was hit.
     fn hits_of(&self, number: usize) -> Option<(&'f BrickFile, usize)> {
-        let entry = self.signs.directory()[number];
-        let hits = self.hits.filter(|_| entry.flags & AS_HIT != 0)?;
-        Some((hits, hits.find(entry.key)?))
+        let hits = self.hits.filter(|_| self.is_as_hit(number))?;
+        Some((hits, hits.find(self.key(number).0)?))
     }
 
     /// Shows a brick.
     ///
     /// # Errors
-    /// [`SignBrickError`].
-    pub fn view(&self, number: usize) -> Result<SignView, SignBrickError> {
+    /// As [`BrickFile::view`].
+    pub fn view(&self, number: usize) -> Result<SignView, StoreError> {
         let signs = self.signs.view(number)?;
-        let brick = self.key(number).position();
-        let hits = match self.hits_of(number) {
-            Some((hits, number)) => Some(hits.view(number)?),
-            None if self.signs.directory()[number].flags & AS_HIT != 0 => {
-                return Err(SignBrickError::NoHits { brick });
-            }
-            None => None,
-        };
-        Ok(SignView { signs, hits, brick })
+        let hits = self.hits_of(number).map(|(hits, number)| hits.view(number)).transpose()?;
+        Ok(SignView { signs, hits, is_as_hit: self.is_as_hit(number) })
     }
 }
 
@@ -118,19 +97,19 @@ impl<'f> SignBricks<'f> {
 pub struct SignView {
     signs: View,
     hits: Option<View>,
-    brick: [u32; 3],
+    is_as_hit: bool,
 }
 
 impl SignView {
     /// What they say, validated.
     ///
     /// # Errors
-    /// [`SignBrickError`].
-    pub fn record(&self) -> Result<SignRecord<'_>, SignBrickError> {
+    /// [`BrickError`]: they are no brick, or not each edge has the one hit that it should.
+    pub fn record(&self) -> Result<SignRecord<'_>, BrickError> {
         let signs = decode_signs(&self.signs)?;
         let hits = self.hits.as_ref().map(|view| decode_hits(view)).transpose()?;
-        if hits.is_some_and(|hits| hits.hits.len() != hits.edges.len()) {
-            return Err(SignBrickError::NoHits { brick: self.brick });
+        if self.is_as_hit && hits.is_none_or(|hits| hits.hits.len() != hits.edges.len()) {
+            return Err(BrickError::NoHits);
         }
         Ok(SignRecord { signs, hits })
     }
@@ -178,9 +157,8 @@ impl<'v> SignRecord<'v> {
     #[inline]
     pub fn each_crossing_within(&self, [first, end]: [u32; 2], mut visit: impl FnMut(Crossing)) {
         if let Some(hits) = self.hits {
-            let edge_of = |bits: u32_le| HitEdge { bits: bits.to_native() }.edge();
-            let start = hits.edges.partition_point(|edge| edge_of(edge.bits) < first);
-            let edges = hits.edges[start..].iter().map(|edge| edge_of(edge.bits));
+            let start = hits.edges.partition_point(|edge| HitEdge::from(edge).edge() < first);
+            let edges = hits.edges[start..].iter().map(|edge| HitEdge::from(edge).edge());
             for (edge, plane) in edges.take_while(|edge| *edge < end).zip(&hits.hits[start..]) {
                 visit(Crossing { edge, plane: plane.to_native() });
             }
@@ -192,5 +170,74 @@ impl<'v> SignRecord<'v> {
             .iter()
             .map(|one| Crossing { edge: one.edge.to_native(), plane: one.plane.to_native() });
         crossings.take_while(|crossing| crossing.edge < end).for_each(visit);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::octree::{HitBrick, SignBrick, SourcePlane, encode};
+    use crate::store::{Backing, BrickWriter, Scratch};
+
+    const EDGES: [u32; 4] = [3, 40, 36_000, 80_000];
+
+    fn file(scratch: &Scratch, name: &str, flags: u32, bytes: &[u8]) -> BrickFile {
+        let mut writer = BrickWriter::create(scratch, name, Backing::Mapped).expect("room");
+        writer.append(7, flags, bytes).expect("room");
+        writer.finish(2).expect("room")
+    }
+
+    fn hits(kept: u32) -> HitBrick {
+        HitBrick {
+            edges: EDGES.map(|edge| HitEdge::new(edge, 1, 1, -1)).to_vec(),
+            hits: (0..kept).rev().collect(),
+            planes: (0..4).map(|source| SourcePlane { source, ..Default::default() }).collect(),
+        }
+    }
+
+    fn crossings(bricks: SignBricks, range: [u32; 2]) -> Vec<Crossing> {
+        let view = bricks.view(0).expect("readable");
+        let mut found = Vec::new();
+        view.record().expect("sound").each_crossing_within(range, |one| found.push(one));
+        found
+    }
+
+    #[test]
+    fn a_brick_that_is_as_it_was_hit_says_what_the_whole_one_says() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let hits = hits(4);
+        let expected: Vec<Crossing> =
+            EDGES.iter().zip(&hits.hits).map(|(&edge, &plane)| Crossing { edge, plane }).collect();
+        let whole = SignBrick {
+            crossings: expected.clone(),
+            planes: hits.planes.clone(),
+            ..SignBrick::default()
+        };
+        let whole = file(&scratch, "whole", 0, &encode(&whole));
+        let as_hit = file(&scratch, "as_hit", AS_HIT, &encode(&SignBrick::default()));
+        let hits = file(&scratch, "hits", 0, &encode(&hits));
+        for range in [[0, u32::MAX], [0, 40], [40, 41], [41, 80_001], [80_001, u32::MAX]] {
+            let within = |one: &Crossing| (range[0]..range[1]).contains(&one.edge);
+            let expected: Vec<_> = expected.iter().copied().filter(within).collect();
+            assert_eq!(crossings(SignBricks::new(&as_hit, &hits), range), expected);
+            assert_eq!(crossings(SignBricks::whole(&whole), range), expected);
+            assert_eq!(crossings(SignBricks::new(&whole, &hits), range), expected);
+        }
+    }
+
+    #[test]
+    fn missing_hits_are_told() {
+        let folder = tempfile::tempdir().expect("a temporary folder");
+        let scratch = Scratch::new(folder.path());
+        let as_hit = file(&scratch, "as_hit", AS_HIT, &encode(&SignBrick::default()));
+        let mut twice = hits(4);
+        twice.edges.pop();
+        twice.edges[0] = HitEdge::new(EDGES[0], 2, 2, 0);
+        let twice = file(&scratch, "twice", 0, &encode(&twice));
+        for bricks in [SignBricks::whole(&as_hit), SignBricks::new(&as_hit, &twice)] {
+            let view = bricks.view(0).expect("readable");
+            assert!(matches!(view.record().map(|_| ()), Err(BrickError::NoHits)));
+        }
     }
 }

@@ -144,7 +144,7 @@ fn mark_offsets(
     let mut offsets = HashMap::new();
     let mut first = 0;
     for edge in hits.edges.iter() {
-        let edge = HitEdge { bits: edge.bits.to_native() };
+        let edge = HitEdge::from(edge);
         if edge.class() & 1 == 1 {
             let plane = SourcePlane::from(&hits.planes[hits.hits[first].to_native() as usize]);
             let (axis, at) = crate::octree::edge_position(edge.edge());

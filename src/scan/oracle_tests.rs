@@ -55,7 +55,7 @@ fn odd_faces(bricks: &BrickFile) -> BTreeSet<Face> {
         let view = bricks.view(number).expect("readable");
         marks.clear();
         for edge in decode_hits(&view).expect("a hit brick").edges.iter() {
-            let edge = HitEdge { bits: edge.bits.to_native() };
+            let edge = HitEdge::from(edge);
             if edge.class() & 1 == 1 {
                 marks.toggle(edge.edge());
             }
@@ -239,7 +239,7 @@ fn edges_with_none_to_nine_hits_keep_their_parity() {
             let view = bricks.view(number).expect("readable");
             let base = BrickKey(entry.key).position().map(|c| i64::from(c) * SIDE as i64);
             for edge in decode_hits(&view).expect("a hit brick").edges.iter() {
-                let edge = HitEdge { bits: edge.bits.to_native() };
+                let edge = HitEdge::from(edge);
                 let sum = edge.signed_sum();
                 let (axis, at) = edge_position(edge.edge());
                 assert_eq!(axis, 0, "the plates are parallel to the other edges");

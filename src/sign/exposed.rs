@@ -124,7 +124,7 @@ impl BrickSays {
         let first_corner = BrickKey(self.key).position().map(|c| c * SIDE as u32);
         let mut first = 0;
         for edge in brick.edges.iter() {
-            let edge = HitEdge { bits: edge.bits.to_native() };
+            let edge = HitEdge::from(edge);
             let hits = &brick.hits[first..first + edge.kept()];
             first += edge.kept();
             let (axis, at) = edge_position(edge.edge());

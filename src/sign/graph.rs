@@ -207,7 +207,7 @@ fn votes_of(
     let mut flips = flips.iter().peekable();
     let mut votes: BTreeMap<([u16; 2], i16), u32> = BTreeMap::new();
     for edge in brick.edges.iter() {
-        let edge = HitEdge { bits: edge.bits.to_native() };
+        let edge = HitEdge::from(edge);
         while flips.next_if(|flip| flip.edge < edge.edge()).is_some() {}
         let is_patched = flips.peek().is_some_and(|flip| flip.edge == edge.edge());
         let (axis, at) = edge_position(edge.edge());

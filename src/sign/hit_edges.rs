@@ -7,12 +7,6 @@
 
 use crate::octree::{ArchivedHitBrick, Crossing, HitEdge, NO_PLANE, PATCH, SourcePlane};
 
-/// An edge as the record has it.
-#[inline]
-pub fn hit_edge(bits: &rkyv::rend::u32_le) -> HitEdge {
-    HitEdge { bits: bits.to_native() }
-}
-
 /// Walks the hit edges of a record.
 pub struct HitEdges<'r> {
     record: Option<&'r ArchivedHitBrick>,
@@ -27,7 +21,7 @@ impl<'r> HitEdges<'r> {
     }
 
     fn peek(&self) -> Option<HitEdge> {
-        Some(hit_edge(&self.record?.edges.get(self.next)?.bits))
+        self.record?.edges.get(self.next).map(HitEdge::from)
     }
 
     fn advance(&mut self, edge: HitEdge) -> &'r [rkyv::rend::u32_le] {

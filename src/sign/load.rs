@@ -87,7 +87,7 @@ impl Loaded {
         if let Some(view) = &view {
             let mut walk = EdgeWalk::default();
             for edge in decode_hits(view)?.edges.iter() {
-                let edge = HitEdge { bits: edge.bits.to_native() };
+                let edge = HitEdge::from(edge);
                 walk.go_to(edge.edge());
                 let (_, [x, _, _]) = walk.position();
                 self.barrier.set_in_row(walk.row(), x);

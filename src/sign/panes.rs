@@ -41,7 +41,7 @@ impl PanesSay {
         let mut votes: BTreeMap<([u16; 2], i16), u32> = BTreeMap::new();
         let mut first = 0;
         for edge in record.edges.iter() {
-            let edge = HitEdge { bits: edge.bits.to_native() };
+            let edge = HitEdge::from(edge);
             let hits = &record.hits[first..first + edge.kept()];
             first += edge.kept();
             while flips.next_if(|flip| flip.edge < edge.edge()).is_some() {}

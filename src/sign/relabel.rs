@@ -3,11 +3,11 @@
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
     AS_HIT, ArchivedHitBrick, Border, CORNER_ROW, CornerBits, Crossing, Domain, EdgeBits,
-    FlipRecord, Flips, LINES, PATCH, ROWS, SIDE, SignBrick, SourcePlane, decode_borders,
+    FlipRecord, Flips, HitEdge, LINES, PATCH, ROWS, SIDE, SignBrick, SourcePlane, decode_borders,
     decode_hits, edge_position, encode, find_regions,
 };
 use crate::sign::flooded::{Flooded, OUTSIDE, SEALED_BY_RESOLUTION, UNTOLD, WOUND};
-use crate::sign::hit_edges::{HitEdges, PlanePicker, hit_edge};
+use crate::sign::hit_edges::{HitEdges, PlanePicker};
 use crate::sign::load::{LoadItem, LoadItems, Loaded};
 use crate::sign::tips::{apart, find_tips};
 use crate::sign::walls::find_walls;
@@ -179,7 +179,7 @@ impl Workspace {
             let walls = find_walls(&self.marks, &self.signs, cell_units, |edge| {
                 let found = record
                     .edges
-                    .binary_search_by_key(&edge, |hit| hit_edge(&hit.bits).edge())
+                    .binary_search_by_key(&edge, |hit| HitEdge::from(hit).edge())
                     .ok()?;
                 Some(SourcePlane::from(&record.planes[record.hits[found].to_native() as usize]))
             });
@@ -190,7 +190,8 @@ impl Workspace {
         let mut brick = self.pick_crossings(record, flips, &mut stats);
         brick.walls = find_walls(&self.marks, &self.signs, cell_units, |edge| {
             let found = brick.crossings.binary_search_by_key(&edge, |one| one.edge).ok()?;
-            brick.planes.get(brick.crossings[found].plane as usize).copied()
+            let plane = brick.crossings[found].plane;
+            (plane & PATCH == 0).then(|| brick.planes[plane as usize])
         });
         stats.walled_faces = brick.walls.len() as u64;
         (brick, 0, stats)

@@ -149,7 +149,7 @@ fn lost_of(
     let mut counts = vec![[0_u32; 2]; brick.planes.len()];
     let mut first = 0;
     for edge in brick.edges.iter() {
-        let edge = HitEdge { bits: edge.bits.to_native() };
+        let edge = HitEdge::from(edge);
         let hits = first..first + edge.kept();
         first = hits.end;
         let (axis, at) = edge_position(edge.edge());

@@ -37,7 +37,7 @@ impl MixedCells {
         self.mixed.resize(CELLS / 64, 0);
         let mut next = 0;
         for edge in brick.edges.iter() {
-            let edge = HitEdge { bits: edge.bits.to_native() };
+            let edge = HitEdge::from(edge);
             for hit in &brick.hits[next..next + edge.kept()] {
                 let plane = &brick.planes[hit.to_native() as usize];
                 self.note(edge.edge(), told(plane.material.to_native(), self.with_patches));
