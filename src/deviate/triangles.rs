@@ -6,7 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
-use crate::octree::{SoupSpool, SoupTriangle};
+use crate::octree::{SoupBlock, SoupSpool, SoupTriangle};
 use crate::store::{Sequence, StoreError};
 
 /// Triangles at one time on their way from where they lie.
@@ -121,10 +121,10 @@ impl Blocks for Triangles<'_> {
             Self::Taped(tape) => return tape.block(start, count, room),
             Self::Spooled(spool) => spool,
         };
-        let mut triangles = Vec::new();
+        let mut triangles = SoupBlock::default();
         spool.read(start, count, &mut triangles)?;
         room.clear();
-        room.extend((start as u32..).zip(&triangles).map(|(n, t)| Triangle::of_soup(n, t)));
+        room.extend((start as u32..).zip(triangles.iter()).map(|(n, t)| Triangle::of_soup(n, t)));
         Ok(room)
     }
 }

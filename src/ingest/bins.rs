@@ -14,8 +14,8 @@ use crate::ingest::crowds::{CrowdFilter, LeftOut};
 use crate::ingest::soup::{SOUP, Soup};
 use crate::monitor::{Gauge, Resident};
 use crate::octree::{
-    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupSpool, SoupTriangle,
-    SoupWriter, for_each_touched_brick, write_bins,
+    BinEntry, BinSpools, BinTriangle, BinnedSoup, Domain, DropRecord, SoupBlock, SoupSpool,
+    SoupTriangle, SoupWriter, for_each_touched_brick, write_bins,
 };
 use crate::store::{FileState, Resources, Sorter, Spool, SpoolWriter, StoreError, ordered};
 
@@ -118,7 +118,7 @@ fn list_entries(
     let mut filter = CrowdFilter::new(domain);
     let mut sorter = Sorter::<BinEntry>::new(resources.scratch, resources.share_bytes);
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
-    let mut next = 0;
+    let (mut next, mut block) = (0, SoupBlock::default());
     let serves = AtomicBool::new(true);
     let (mut listed, mut held) = (0, 0);
     ordered(
@@ -128,8 +128,8 @@ fn list_entries(
                 return Err(StoreError::Cancelled);
             }
             let first = next;
-            let mut triangles = Vec::new();
-            soup.spool.read(first, ITEM_TRIANGLES, &mut triangles)?;
+            soup.spool.read(first, ITEM_TRIANGLES, &mut block)?;
+            let mut triangles = block.take();
             next += triangles.len() as u64;
             triangles.iter().for_each(|triangle| histogram.add(triangle));
             let count = triangles.len();
@@ -195,7 +195,7 @@ fn sort_copies(
     let mut histogram = AreaHistogram::new(soup.facts.bounds);
     let mut filter = CrowdFilter::new(domain);
     let mut sorter = Sorter::<BinTriangle>::new(resources.scratch, resources.share_bytes);
-    let (mut next, mut looks) = (0, Vec::new());
+    let (mut next, mut block, mut looks) = (0, SoupBlock::default(), Vec::new());
     let resident = Resident::new(Gauge::ResidentTriangles, resources.monitor);
     ordered(
         resources.pool,
@@ -203,8 +203,8 @@ fn sort_copies(
             if resources.monitor.cancelled() {
                 return Err(StoreError::Cancelled);
             }
-            let mut triangles = Vec::new();
-            soup.spool.read(next, ITEM_TRIANGLES, &mut triangles)?;
+            soup.spool.read(next, ITEM_TRIANGLES, &mut block)?;
+            let mut triangles = block.take();
             soup.looks.put_on(next, &mut triangles, &mut looks)?;
             next += triangles.len() as u64;
             triangles.iter().for_each(|triangle| histogram.add(triangle));

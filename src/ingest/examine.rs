@@ -45,6 +45,12 @@ impl Owned {
         // What lies below wraps around.
         (0..3).all(|a| point[a].wrapping_sub(self.low[a]) < self.side)
     }
+
+    /// Whether it holds the lowest of these points.
+    #[inline]
+    fn holds_lowest(&self, points: &[Point]) -> bool {
+        points.iter().min().is_some_and(|lowest| self.holds(*lowest))
+    }
 }
 
 /// The edges of a triangle with ascending corners that have a length, their lower ends first.
@@ -53,16 +59,18 @@ fn edges_of([p, q, r]: [Point; 3]) -> impl Iterator<Item = [Point; 2]> {
     [[p, q], [q, r], [p, r]].into_iter().filter(|[lower, upper]| lower != upper)
 }
 
-/// Two coordinates as one word, to be mixed.
+/// Two hashes of a corner.
 #[inline]
-fn word_of([low, high]: [u32; 2]) -> u64 {
-    u64::from(low) | u64::from(high) << 32
+fn hashes_of([x, y, z]: Point) -> [u64; 2] {
+    let word = u64::from(x) | u64::from(y) << 32;
+    [mix(&[word, z.into()]), mix(&[z.into(), word])]
 }
 
-/// A hash of a triangle with ascending corners.
+/// A hash of what has corners with these hashes, whatever their order.
 #[inline]
-fn hash_of([[a, b, c], [d, e, f], [g, h, i]]: [Point; 3]) -> u64 {
-    mix(&[[a, b], [c, d], [e, f], [g, h], [i, 0]].map(word_of))
+fn hash_of(corners: &[u64]) -> u64 {
+    let fold = |how: fn(u64, u64) -> u64| corners.iter().copied().fold(0, how);
+    mix(&[fold(u64::wrapping_add), fold(|a, b| a ^ b)])
 }
 
 /// Tells whether any of the edges that were added came an odd number of times: those that came twice
@@ -71,11 +79,12 @@ fn hash_of([[a, b, c], [d, e, f], [g, h, i]]: [Point; 3]) -> u64 {
 struct Parity([u64; 2]);
 
 impl Parity {
+    /// Adds an edge between corners with these hashes.
     #[inline]
-    fn add(&mut self, [[a, b, c], [d, e, f]]: [Point; 2]) {
-        let [first, second, third] = [[a, b], [c, d], [e, f]].map(word_of);
-        self.0[0] ^= mix(&[first, second, third]);
-        self.0[1] ^= mix(&[third, first, second]);
+    fn add(&mut self, from: [u64; 2], to: [u64; 2]) {
+        for i in 0..2 {
+            self.0[i] ^= hash_of(&[from[i], to[i]]);
+        }
     }
 
     fn has_odd(&self) -> bool {
@@ -119,13 +128,23 @@ impl Examiner<'_> {
         let mut parity = Parity::default();
         let mut has_copies = false;
         self.each(bin, |triangle| {
-            let mut corners = snapped(self.domain, triangle);
-            corners.sort_unstable();
-            if owned.holds(corners[0]) && is_degenerate(corners) {
+            let corners = snapped(self.domain, triangle);
+            let is_held = corners.map(|corner| owned.holds(corner));
+            if is_degenerate(corners) && owned.holds_lowest(&corners) {
                 stats.degenerate_triangles += 1;
             }
-            has_copies |= !seen.insert(hash_of(corners));
-            edges_of(corners).filter(|ends| owned.holds(ends[0])).for_each(|e| parity.add(e));
+            let hashes = corners.map(hashes_of);
+            has_copies |= !seen.insert(hash_of(&hashes.map(|[first, _]| first)));
+            for [i, j] in [[0, 1], [1, 2], [2, 0]] {
+                let is_owned = match (is_held[i], is_held[j]) {
+                    (true, true) => true,
+                    (false, false) => false,
+                    _ => owned.holds_lowest(&[corners[i], corners[j]]),
+                };
+                if is_owned && corners[i] != corners[j] {
+                    parity.add(hashes[i], hashes[j]);
+                }
+            }
             Ok(())
         })?;
         if has_copies {

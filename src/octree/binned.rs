@@ -5,7 +5,9 @@ use std::ops::Range;
 use bytemuck::{Pod, Zeroable};
 
 use crate::monitor::Resident;
-use crate::octree::{BinTriangle, BrickKey, DropRecord, SoupSpool, SoupTriangle, SoupWriter};
+use crate::octree::{
+    BinTriangle, BrickKey, DropRecord, SoupBlock, SoupSpool, SoupTriangle, SoupWriter,
+};
 use crate::store::{Record, Resources, Sorter, Spool, SpoolPeek, SpoolWriter, StoreError};
 
 /// Triangles between two entries that are rather read in vain than passed over.
@@ -92,9 +94,10 @@ impl<'b> BinSpools<'b> {
         let Range { start, end } = bin.entries;
         let mut entries = SpoolPeek::range(self.entries, start, end - start);
         let mut reader = self.triangles.reader(0, 0);
-        let mut block = Vec::new();
+        let mut block = SoupBlock::default();
+        let mut span = Span::default();
         while let Some(entry) = entries.next()? {
-            let span = Span::from(entry, &mut entries)?;
+            span.take(entry, &mut entries)?;
             let first = span.entries[0].first;
             if span.entries.len() == 1 {
                 reader.turn_to(first, entry.count);
@@ -116,6 +119,7 @@ impl<'b> BinSpools<'b> {
 }
 
 /// Entries of a brick that are read at one time, with what lies between them.
+#[derive(Default)]
 struct Span {
     entries: Vec<BinEntry>,
     /// Behind the last triangle.
@@ -123,19 +127,25 @@ struct Span {
 }
 
 impl Span {
-    /// `first` with those of the next entries that are near.
-    fn from(first: BinEntry, entries: &mut SpoolPeek<BinEntry>) -> Result<Self, StoreError> {
-        let mut span = Self { entries: vec![first], end: first.first + first.count };
+    /// Goes on with `first` and those of the next entries that are near.
+    fn take(
+        &mut self,
+        first: BinEntry,
+        entries: &mut SpoolPeek<BinEntry>,
+    ) -> Result<(), StoreError> {
+        self.entries.clear();
+        self.entries.push(first);
+        self.end = first.first + first.count;
         while let Some(next) = entries.peek()? {
             let end = next.first + next.count;
-            if next.first - span.end > MOST_BETWEEN || end - first.first > MOST_IN_SPAN {
+            if next.first - self.end > MOST_BETWEEN || end - first.first > MOST_IN_SPAN {
                 break;
             }
             entries.next()?;
-            span.entries.push(next);
-            span.end = end;
+            self.entries.push(next);
+            self.end = end;
         }
-        Ok(span)
+        Ok(())
     }
 }
 

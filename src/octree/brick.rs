@@ -237,22 +237,24 @@ pub fn decode_hits(bytes: &[u8]) -> Result<&ArchivedHitBrick, BrickError> {
     let kind = "hit";
     let brick = rkyv::access::<ArchivedHitBrick, BoxedError>(bytes)
         .map_err(|source| BrickError::Invalid { kind, source })?;
-    let mut kept = 0;
-    for edge in brick.edges.iter() {
-        let edge = HitEdge::from(edge);
-        if edge.edge() >= 3 * AXIS_EDGES {
-            return Err(out_of_range(kind, "edge", edge.edge().into(), (3 * AXIS_EDGES).into()));
-        }
-        kept += edge.kept();
+    // Without a way out of the loops they run over many at once.
+    let (mut last, mut kept) = (0, 0_u32);
+    for edge in brick.edges.iter().map(HitEdge::from) {
+        last = edge.edge().max(last);
+        kept += edge.kept() as u32;
     }
-    if kept != brick.hits.len() {
+    if last >= 3 * AXIS_EDGES {
+        return Err(out_of_range(kind, "edge", last.into(), (3 * AXIS_EDGES).into()));
+    }
+    if kept as usize != brick.hits.len() {
         return Err(out_of_range(kind, "kept hits", kept as u64, brick.hits.len() as u64));
     }
     let planes = brick.planes.len() as u64;
-    match brick.hits.iter().find(|hit| u64::from(hit.to_native()) >= planes) {
-        Some(hit) => Err(out_of_range(kind, "plane", hit.to_native().into(), planes)),
-        None => Ok(brick),
+    let last = brick.hits.iter().fold(0, |last, hit| hit.to_native().max(last)).into();
+    if !brick.hits.is_empty() && last >= planes {
+        return Err(out_of_range(kind, "plane", last, planes));
     }
+    Ok(brick)
 }
 
 /// Validates a [`SignBrick`].

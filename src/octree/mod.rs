@@ -55,7 +55,7 @@ pub use plane::clamp_to_edge;
 pub use region::{FaceRegions, Regions, find_regions};
 pub use sign_bricks::{AS_HIT, SignBricks, SignRecord, SignView};
 pub use soup_edges::{BorderUse, MOST_USES, Panes, SoupEdges, TrianglePair, each_border};
-pub use soup_spool::{NarrowTriangle, SoupReader, SoupSpool, SoupWriter};
+pub use soup_spool::{NarrowTriangle, SoupBlock, SoupReader, SoupSpool, SoupWriter};
 pub use touch::for_each_touched_brick;
 pub use triangle::{
     AttributeRecord, BinTriangle, CLOSES, DropRecord, SoupTriangle, TRANSPARENT, surface_of,

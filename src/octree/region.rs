@@ -45,9 +45,8 @@ impl Regions {
 #[must_use]
 pub fn find_regions(barrier: &EdgeBits) -> Regions {
     let mut regions = Regions::default();
-    let mut parents: Vec<u16> = Vec::new();
     split_rows(barrier.rows(0), &mut regions);
-    parents.extend(0..regions.runs.len() as u16);
+    let mut parents: Vec<u16> = (0..regions.runs.len() as u16).collect();
     for row in 0..ROWS {
         if row % LINES != LINES - 1 {
             join_rows(&regions, &mut parents, row, row + 1, !barrier.rows(1)[row]);
@@ -62,6 +61,9 @@ pub fn find_regions(barrier: &EdgeBits) -> Regions {
 
 /// Cuts every row at its barriers.
 fn split_rows(along: &[u64], regions: &mut Regions) {
+    regions.row_starts.reserve(along.len() + 1);
+    // Most rows that the surface passes are cut once.
+    regions.runs.reserve(2 * along.len());
     for &cuts in along {
         regions.row_starts.push(regions.runs.len() as u32);
         push_runs(cuts, &mut regions.runs);
@@ -117,6 +119,7 @@ fn join(parents: &mut [u16], a: u16, b: u16) {
 /// Numbers the sets in the order of their first members.
 fn number_in_order(parents: &mut [u16], labels: &mut Vec<u16>, count: &mut u16) {
     labels.clear();
+    labels.reserve(parents.len());
     for run in 0..parents.len() {
         let root = root(parents, run as u16) as usize;
         let label = if root == run {

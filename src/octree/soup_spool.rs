@@ -187,15 +187,15 @@ impl SoupSpool {
         &self,
         first: u64,
         count: usize,
-        triangles: &mut Vec<SoupTriangle>,
+        triangles: &mut SoupBlock,
     ) -> Result<(), StoreError> {
+        let SoupBlock { wide, narrow } = triangles;
         match &self.form {
-            Form::Wide(spool) => spool.read(first, count, triangles),
+            Form::Wide(spool) => spool.read(first, count, wide),
             Form::Narrow(spool) => {
-                let mut narrow = Vec::new();
-                spool.read(first, count, &mut narrow)?;
-                triangles.clear();
-                triangles.extend(narrow.iter().map(NarrowTriangle::wide));
+                spool.read(first, count, narrow)?;
+                wide.clear();
+                wide.extend(narrow.iter().map(NarrowTriangle::wide));
                 Ok(())
             }
         }
@@ -209,6 +209,28 @@ impl SoupSpool {
             Form::Wide(spool) => ReaderForm::Wide(spool.reader(first, count)),
         };
         SoupReader { form }
+    }
+}
+
+/// Triangles that were read from a spool, and room for the next.
+#[derive(Default)]
+pub struct SoupBlock {
+    wide: Vec<SoupTriangle>,
+    narrow: Vec<NarrowTriangle>,
+}
+
+impl SoupBlock {
+    /// Takes the triangles out.
+    #[must_use]
+    pub fn take(&mut self) -> Vec<SoupTriangle> {
+        std::mem::take(&mut self.wide)
+    }
+}
+
+impl std::ops::Deref for SoupBlock {
+    type Target = [SoupTriangle];
+    fn deref(&self) -> &[SoupTriangle] {
+        &self.wide
     }
 }
 
@@ -272,10 +294,10 @@ mod tests {
                 let state = writer.finish().expect("finish works").state().clone();
                 let soup = SoupSpool::open(&scratch, &state).expect("open works");
                 assert_eq!(matches!(soup.form, Form::Wide(_)), first_wide < count);
-                let mut read = Vec::new();
+                let mut read = SoupBlock::default();
                 soup.read(1, 4500, &mut read).expect("read works");
                 let end = all.len().min(4501);
-                assert_eq!(read, all[end.min(1)..end]);
+                assert_eq!(read[..], all[end.min(1)..end]);
                 let mut reader = soup.reader(0, soup.len());
                 let mut back = Vec::new();
                 while let Some(block) = reader.next_block().expect("read works") {
@@ -293,8 +315,8 @@ mod tests {
         let added = SoupTriangle { stands_for: 5, ..triangle(1, false) };
         let mut writer = SoupWriter::create(&scratch, "soup").expect("create works");
         writer.push(added).expect("push works");
-        let mut read = Vec::new();
+        let mut read = SoupBlock::default();
         writer.finish().expect("finish works").read(0, 9, &mut read).expect("read works");
-        assert_eq!(read, [added]);
+        assert_eq!(read[..], [added]);
     }
 }

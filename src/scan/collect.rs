@@ -10,15 +10,33 @@ use crate::octree::{
 /// Hits that are held before they are reduced. Large enough for every brick of a sane model.
 pub const CHUNK_HITS: usize = 1 << 16;
 
-/// One hit of a triangle on an edge.
-#[derive(Clone, Copy, Debug)]
-pub struct Hit {
-    /// Edge number in the brick.
-    pub edge: u32,
-    /// Plane number in the brick.
-    pub plane: u32,
-    /// Whether the triangle faces up the edge's axis.
-    pub up: bool,
+/// One hit of a triangle on an edge, by edge and then by plane. A single word is sorted fast.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
+pub struct Hit(u64);
+
+impl Hit {
+    /// A hit on an edge by the plane with this number in the brick; whether the triangle faces up the edge's
+    /// axis.
+    #[inline]
+    pub fn new(edge: u32, plane: u32, is_up: bool) -> Self {
+        Self(u64::from(edge) << 33 | u64::from(plane) << 1 | u64::from(is_up))
+    }
+
+    #[inline]
+    fn edge(self) -> u32 {
+        (self.0 >> 33) as u32
+    }
+
+    #[inline]
+    fn plane(self) -> u32 {
+        (self.0 >> 1) as u32
+    }
+
+    /// +1 where the triangle faces up the axis, -1 where down.
+    #[inline]
+    fn sign(self) -> i16 {
+        if self.0 & 1 == 1 { 1 } else { -1 }
+    }
 }
 
 /// A plane with its place on the edge under way.
@@ -105,11 +123,11 @@ impl Collector {
         brick.hits.reserve_exact(self.sorted.len());
         let mut start = 0;
         while start < self.sorted.len() {
-            let edge = self.sorted[start].edge;
-            let count = self.sorted[start..].iter().take_while(|hit| hit.edge == edge).count();
+            let edge = self.sorted[start].edge();
+            let count = self.sorted[start..].iter().take_while(|hit| hit.edge() == edge).count();
             if let [hit] = self.sorted[start..start + count] {
-                brick.edges.push(HitEdge::new(edge, 1, 1, if hit.up { 1 } else { -1 }));
-                brick.hits.push(hit.plane);
+                brick.edges.push(HitEdge::new(edge, 1, 1, hit.sign()));
+                brick.hits.push(hit.plane());
             } else {
                 self.merge(None, start, count).push_to(&mut brick);
             }
@@ -146,13 +164,13 @@ impl Collector {
     fn reduce(&mut self) {
         self.sort_chunk();
         let old = std::mem::take(&mut self.edges);
-        let new = self.sorted.chunk_by(|a, b| a.edge == b.edge).count();
+        let new = self.sorted.chunk_by(|a, b| a.edge() == b.edge()).count();
         let mut merged = Vec::with_capacity(old.len() + new);
         let mut before = old.into_iter().peekable();
         let mut start = 0;
         while start < self.sorted.len() {
-            let edge = self.sorted[start].edge;
-            let count = self.sorted[start..].iter().take_while(|hit| hit.edge == edge).count();
+            let edge = self.sorted[start].edge();
+            let count = self.sorted[start..].iter().take_while(|hit| hit.edge() == edge).count();
             while let Some(earlier) = before.next_if(|earlier| earlier.edge < edge) {
                 merged.push(earlier);
             }
@@ -175,27 +193,31 @@ impl Collector {
     fn sort_chunk(&mut self) {
         self.rows.fill(0);
         for hit in &self.chunk {
-            self.rows[hit.edge as usize / LINES + 1] += 1;
+            self.rows[hit.edge() as usize / LINES + 1] += 1;
         }
         for row in 0..ALL_ROWS {
             self.rows[row + 1] += self.rows[row];
         }
         self.sorted.clear();
-        self.sorted.resize(self.chunk.len(), Hit { edge: 0, plane: 0, up: false });
+        self.sorted.resize(self.chunk.len(), Hit::default());
         for &hit in &self.chunk {
-            let slot = &mut self.rows[hit.edge as usize / LINES];
+            let slot = &mut self.rows[hit.edge() as usize / LINES];
             self.sorted[*slot as usize] = hit;
             *slot += 1;
         }
         let mut start = 0;
         for (number, &end) in self.rows[..ALL_ROWS].iter().enumerate() {
+            // Most rows have none.
+            if start == end {
+                continue;
+            }
             let row = &mut self.sorted[start as usize..end as usize];
             if row.len() > 1 {
-                row.sort_unstable_by_key(|hit| (hit.edge, hit.plane));
+                row.sort_unstable();
             }
             if number % LINES < SIDE && number / LINES % LINES < SIDE {
                 let last = (number * LINES + SIDE) as u32;
-                let beyond = row.iter().rev().take_while(|hit| hit.edge == last).count();
+                let beyond = row.iter().rev().take_while(|hit| hit.edge() == last).count();
                 self.owned_hits += (row.len() - beyond) as u64;
             }
             start = end;
@@ -212,15 +234,16 @@ impl Collector {
     /// Adds the sorted hits `start..start + count`, all on one edge, to what was there.
     fn merge(&self, earlier: Option<EdgeHits>, start: usize, count: usize) -> EdgeHits {
         let hits = &self.sorted[start..start + count];
-        let edge = hits[0].edge;
+        let edge = hits[0].edge();
         let none =
             EdgeHits { edge, planes: [NO_PLANE; MAX_HITS], signed_sum: 0, class: 0, kept: 0 };
         let mut all = earlier.unwrap_or(none);
         for hit in hits {
             all.class = HitEdge::next_class(all.class.into()) as u8;
-            all.signed_sum = all.signed_sum.saturating_add(if hit.up { 1 } else { -1 });
+            all.signed_sum = all.signed_sum.saturating_add(hit.sign());
         }
-        let mut group: Vec<Placed> = hits.iter().map(|hit| self.placed(edge, hit.plane)).collect();
+        let mut group: Vec<Placed> =
+            hits.iter().map(|hit| self.placed(edge, hit.plane())).collect();
         group.sort_by(|a, b| a.offset.total_cmp(&b.offset));
         let mut candidates = [group[0]; 2 * MAX_HITS];
         let mut count = usize::from(all.kept);

@@ -79,7 +79,7 @@ impl Converter {
                     at[(axis + 1) % 3] = column[0];
                     at[(axis + 2) % 3] = column[1];
                     let edge = edge_index(axis, at);
-                    collector.add(Hit { edge, plane, up: normal[axis] > 0 });
+                    collector.add(Hit::new(edge, plane, normal[axis] > 0));
                 });
             }
         }

@@ -42,10 +42,14 @@ impl Workspace {
         let centre = DVec3::from(low.map(f64::from)) + side as f64 * 0.5;
         let start = at + along * along.dot(centre - at);
         let steps = (reach / CREASE_STEP_CELLS) as i32;
+        let mut last = None;
         (-steps..=steps).all(|step| {
             let point = start + along * (f64::from(step) * CREASE_STEP_CELLS);
             // Rounded down: nothing that is near lies below -1.
             let cell = point.to_array().map(|c| (c + 2.0) as i32 - 2);
+            if last.replace(cell) == Some(cell) {
+                return true;
+            }
             let is_near = (0..3).all(|a| (low[a] - 1..=low[a] + side as i32).contains(&cell[a]));
             !is_near || self.has_surface(cell)
         })
@@ -54,6 +58,9 @@ impl Workspace {
     /// Whether the surface passes a cell, as far as the corners of the brick tell.
     fn has_surface(&self, cell: [i32; 3]) -> bool {
         let last = SIDE as i32;
+        if cell.iter().all(|c| (0..last).contains(c)) {
+            return !matches!(self.signs.cell_mask(cell.map(|c| c as usize)), 0 | 255);
+        }
         let corners = (0..8).filter_map(|corner| {
             let at: [i32; 3] = std::array::from_fn(|a| cell[a] + (corner >> a & 1));
             let is_here = at.iter().all(|c| (0..=last).contains(c));

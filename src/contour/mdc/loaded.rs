@@ -25,6 +25,7 @@ pub struct Vertex {
 const SHARED: u32 = 1 << 31;
 
 /// A brick as seen from another, or from itself.
+#[derive(Default)]
 pub struct Loaded {
     /// Packed cells, ascending.
     pub cells: Vec<u32>,
@@ -48,11 +49,13 @@ pub struct Loaded {
 
 impl Loaded {
     /// Loads a brick that lies `steps` bricks away along each axis, -1, 0 or 1: of its cells those
-    /// that touch the brick it is seen from, and all of them when it is that brick.
+    /// that touch the brick it is seen from, and all of them when it is that brick. It takes the room of
+    /// `spare`, one that is not needed any more.
     ///
     /// # Errors
     /// [`ContourError::Contradiction`].
     pub fn new(
+        spare: Self,
         (record, points): (&ArchivedCellBrick, &[ArchivedFacePoint]),
         key: BrickKey,
         steps: [i32; 3],
@@ -60,11 +63,17 @@ impl Loaded {
     ) -> Result<Self, ContourError> {
         let is_whole = steps == [0; 3];
         let shift = steps.map(|step| step * brick_units as i32);
-        let mut filling = Filling::new(record, key, shift, is_whole);
+        let mut filling = Filling::new(spare, record, key, shift);
         let (side_bits, side) = side_of(steps);
         for cell in record.cells.iter() {
             let cell = cell.to_native();
-            filling.pass(cell, cell_number(cell) & side_bits == side)?;
+            let number = cell_number(cell);
+            let is_wanted = number & side_bits == side;
+            if !is_wanted && filling.walk.is_in_one_vertex(number) {
+                filling.pass_over(cell);
+            } else {
+                filling.pass(cell, is_wanted)?;
+            }
         }
         if is_whole {
             filling.add_surfaces()?;
@@ -98,18 +107,28 @@ impl Loaded {
         &self.vertices[(self.firsts[rank] & !SHARED) as usize]
     }
 
-    fn with_room(cells: usize) -> Self {
-        Self {
-            cells: Vec::with_capacity(cells),
-            firsts: Vec::with_capacity(cells),
-            vertices: Vec::with_capacity(cells / 2),
-            offset_firsts: Vec::with_capacity(cells),
-            offsets: Vec::with_capacity(cells + cells / 2),
-            surfaces: Vec::new(),
-            sources: Vec::new(),
-            points: Vec::new(),
-            point_positions: Vec::new(),
-        }
+    /// Nothing, with the same room.
+    fn clear(&mut self) {
+        let Self {
+            cells,
+            firsts,
+            vertices,
+            offset_firsts,
+            offsets,
+            surfaces,
+            sources,
+            points,
+            point_positions,
+        } = self;
+        cells.clear();
+        firsts.clear();
+        vertices.clear();
+        offset_firsts.clear();
+        offsets.clear();
+        surfaces.clear();
+        sources.clear();
+        points.clear();
+        point_positions.clear();
     }
 
     /// What a crossing is, by its place among the offsets; `None` where nothing is told.
@@ -148,8 +167,13 @@ struct Filling<'r> {
 }
 
 impl<'r> Filling<'r> {
-    fn new(record: &'r ArchivedCellBrick, key: BrickKey, shift: [i32; 3], is_whole: bool) -> Self {
-        let loaded = Loaded::with_room(if is_whole { record.cells.len() } else { 0 });
+    fn new(
+        mut loaded: Loaded,
+        record: &'r ArchivedCellBrick,
+        key: BrickKey,
+        shift: [i32; 3],
+    ) -> Self {
+        loaded.clear();
         let walk = CutWalk::new(record);
         let mut filling = Self { record, key, shift, walk, offset: 0, shared: (0, 0), loaded };
         let above = record.above.as_ref().map(|above| Vertex {
@@ -175,17 +199,20 @@ impl<'r> Filling<'r> {
         Ok(Vertex { number, position: self.moved(position.map(|c| c.to_native())), cut })
     }
 
+    /// Passes the next cell, which needs nothing but to be passed.
+    #[inline]
+    fn pass_over(&mut self, cell: u32) {
+        self.offset += usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
+    }
+
     /// Passes the next cell, and adds it if it is wanted.
     #[inline]
     fn pass(&mut self, cell: u32, is_wanted: bool) -> Result<(), ContourError> {
         let first_offset = self.offset;
-        self.offset += usize::from(OWN_EDGES[usize::from(cell_mask(cell))]);
-        let number = cell_number(cell);
-        let goes_on = self.walk.is_in_one_vertex(number);
-        if !is_wanted && goes_on {
-            return Ok(());
-        }
+        self.pass_over(cell);
         if is_wanted {
+            let number = cell_number(cell);
+            let goes_on = self.walk.is_in_one_vertex(number);
             self.loaded.cells.push(cell);
             self.loaded.offset_firsts.push(self.loaded.offsets.len() as u32);
             let own = self.record.offsets.get(first_offset..self.offset);

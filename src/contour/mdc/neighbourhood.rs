@@ -90,6 +90,8 @@ pub struct Neighbourhood<'f> {
     bricks: [Option<Loaded>; 27],
     /// The numbers of those bricks.
     numbers: [usize; 27],
+    /// Bricks that were moved away from: their room is taken again.
+    spare: Vec<Loaded>,
 }
 
 impl<'f> Neighbourhood<'f> {
@@ -102,6 +104,7 @@ impl<'f> Neighbourhood<'f> {
             ranks: vec![NO_RANK; SIDE * SIDE * SIDE],
             bricks: [const { None }; 27],
             numbers: [usize::MAX; 27],
+            spare: Vec::new(),
         }
     }
 
@@ -111,11 +114,15 @@ impl<'f> Neighbourhood<'f> {
     /// [`ContourError`].
     pub fn move_to(&mut self, number: usize) -> Result<(), ContourError> {
         self.key = self.layers.key(number);
-        self.bricks = [const { None }; 27];
+        // The own brick comes last, and so takes the room of the one before.
+        let own = self.bricks[OWN].take();
+        self.spare.extend(self.bricks.iter_mut().filter_map(Option::take));
+        self.spare.extend(own);
         self.numbers = [usize::MAX; 27];
         let (key, units) = (self.key, self.domain.brick_units());
+        let spare = self.spare.pop().unwrap_or_default();
         let own = self.layers.read_with_points(number, |record, points| {
-            Loaded::new((record, points), key, [0; 3], units)
+            Loaded::new(spare, (record, points), key, [0; 3], units)
         })?;
         self.ranks.fill(NO_RANK);
         for (rank, &cell) in own.cells.iter().enumerate() {
@@ -160,8 +167,9 @@ impl<'f> Neighbourhood<'f> {
             let Some(key) = brick_around(self.key, slot) else { return Ok(None) };
             let Some(number) = self.layers.find(key) else { return Ok(None) };
             let units = self.domain.brick_units();
+            let spare = self.spare.pop().unwrap_or_default();
             let loaded = self.layers.read_with_points(number, |record, points| {
-                Loaded::new((record, points), key, steps, units)
+                Loaded::new(spare, (record, points), key, steps, units)
             })?;
             self.bricks[slot] = Some(loaded);
             self.numbers[slot] = number;

@@ -20,6 +20,8 @@ pub struct BrickFile {
     state: Option<FileState>,
     directory: Vec<DirectoryEntry>,
     checked: Vec<AtomicU64>,
+    /// All windows that have records.
+    records_bytes: u64,
     bytes: Bytes,
 }
 
@@ -31,27 +33,51 @@ pub(crate) enum Bytes {
 impl Bytes {
     pub(crate) fn mapped(file: ScratchFile, capacity: usize) -> Self {
         let most_bytes = capacity.max(1) as u64 * WINDOW_BYTES;
-        let cache = WindowCache { windows: HashMap::new(), clock: 0, held_bytes: 0, most_bytes };
+        let at_once_bytes = (capacity as u64 / FEWEST_MAPS).clamp(1, MOST_AT_ONCE) * WINDOW_BYTES;
+        let windows = HashMap::new();
+        let cache = WindowCache { windows, clock: 0, held_bytes: 0, most_bytes, at_once_bytes };
         Self::Mapped { file: Box::new(file), cache: Mutex::new(cache) }
     }
 }
+
+/// Windows that are mapped at once where there is room: each map that is let go interrupts all threads.
+const MOST_AT_ONCE: u64 = 4;
+/// As long as so many maps have room.
+const FEWEST_MAPS: u64 = 8;
 
 pub(crate) struct WindowCache {
     windows: HashMap<u64, (Arc<Mmap>, u64)>,
     clock: u64,
     held_bytes: u64,
     most_bytes: u64,
+    at_once_bytes: u64,
 }
 
 impl WindowCache {
-    /// Lets the windows go that were used longest ago, until `span` fits beside the others.
-    fn make_room(&mut self, span: u64) {
+    /// Takes out the windows that were used longest ago, until `span` fits beside the others.
+    fn make_room(&mut self, span: u64) -> Vec<Arc<Mmap>> {
+        let mut gone = Vec::new();
         while self.held_bytes + span > self.most_bytes {
             let oldest = self.windows.iter().min_by_key(|(_, (_, used))| *used);
-            let Some(start) = oldest.map(|(start, _)| *start) else { return };
+            let Some(start) = oldest.map(|(start, _)| *start) else { break };
             if let Some((window, _)) = self.windows.remove(&start) {
                 self.held_bytes -= window.len() as u64;
+                gone.push(window);
             }
+        }
+        gone
+    }
+
+    /// Where the map begins that has a record, and its length. One that is larger than a window has a map of
+    /// its own.
+    fn span_of(&self, entry: &DirectoryEntry, file_bytes: u64) -> (u64, u64) {
+        let start = entry.offset / self.at_once_bytes * self.at_once_bytes;
+        let end = entry.offset + u64::from(entry.len_bytes);
+        if end <= start + self.at_once_bytes {
+            (start, self.at_once_bytes.min(file_bytes - start))
+        } else {
+            let start = entry.offset / WINDOW_BYTES * WINDOW_BYTES;
+            (start, (end - start).next_multiple_of(WINDOW_BYTES))
         }
     }
 }
@@ -64,7 +90,9 @@ impl BrickFile {
         bytes: Bytes,
     ) -> Self {
         let checked = (0..directory.len().div_ceil(64)).map(|_| AtomicU64::new(0)).collect();
-        Self { scratch, state, directory, checked, bytes }
+        let end = directory.last().map_or(0, |last| last.offset + u64::from(last.len_bytes));
+        let records_bytes = end.next_multiple_of(WINDOW_BYTES);
+        Self { scratch, state, directory, checked, records_bytes, bytes }
     }
 
     /// Opens a brick file that an earlier run finished.
@@ -132,10 +160,8 @@ impl BrickFile {
                 len: entry.len_bytes as usize,
             },
             Bytes::Mapped { file, cache } => {
-                let start = entry.offset / WINDOW_BYTES * WINDOW_BYTES;
+                let (map, start) = self.map_of(&entry, file, cache)?;
                 let at = (entry.offset - start) as usize;
-                let span = (at as u64 + u64::from(entry.len_bytes)).next_multiple_of(WINDOW_BYTES);
-                let map = self.window(file, cache, start, span)?;
                 View { holder: Holder::Mapped(map), at, len: entry.len_bytes as usize }
             }
         };
@@ -152,29 +178,33 @@ impl BrickFile {
         }
     }
 
-    fn window(
+    /// The map that has a record, and where in the file it begins.
+    fn map_of(
         &self,
+        entry: &DirectoryEntry,
         file: &ScratchFile,
         cache: &Mutex<WindowCache>,
-        start: u64,
-        span: u64,
-    ) -> Result<Arc<Mmap>, StoreError> {
+    ) -> Result<(Arc<Mmap>, u64), StoreError> {
         let mut cache = cache.lock().unwrap_or_else(PoisonError::into_inner);
+        let (start, span) = cache.span_of(entry, self.records_bytes);
         cache.clock += 1;
         let now = cache.clock;
         if let Some((map, used)) = cache.windows.get_mut(&start) {
             *used = now;
-            return Ok(Arc::clone(map));
+            return Ok((Arc::clone(map), start));
         }
-        cache.make_room(span);
+        let gone = cache.make_room(span);
         let mapped = Arc::new(map(file, start, span as usize)?);
-        self.scratch.count_read(span);
         // One that is larger than all room lives as long as it is looked at.
         if cache.held_bytes + span <= cache.most_bytes {
             cache.held_bytes += span;
             cache.windows.insert(start, (Arc::clone(&mapped), now));
         }
-        Ok(mapped)
+        // To let go of maps takes long, and others wait.
+        drop(cache);
+        drop(gone);
+        self.scratch.count_read(span);
+        Ok((mapped, start))
     }
 
     fn check(&self, number: usize, bytes: &[u8]) -> Result<(), StoreError> {

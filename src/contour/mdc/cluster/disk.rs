@@ -51,8 +51,8 @@ struct Places {
     inner_faces: [u128; 3],
     /// Edges along each axis that lie on no side of the block.
     inner_edges: [u128; 3],
-    /// Edges along each axis on the edge of the block from its min corner.
-    first_edges: [u128; 3],
+    /// Edges along each axis on the four edges of the block along it, the lower ones first.
+    outer_edges: [[u128; 4]; 3],
 }
 
 const fn places(side: usize) -> Places {
@@ -62,7 +62,7 @@ const fn places(side: usize) -> Places {
         faces: none,
         inner_faces: none,
         inner_edges: none,
-        first_edges: none,
+        outer_edges: [[0; 4]; 3],
     };
     let mut axis = 0;
     while axis < 3 {
@@ -74,65 +74,74 @@ const fn places(side: usize) -> Places {
         let mut first = [1; 3];
         first[axis] = 0;
         all.inner_edges[axis] = bits(first, [side; 3]);
-        let mut end = [1; 3];
-        end[axis] = side;
-        all.first_edges[axis] = bits([0; 3], end);
+        let mut ends = 0;
+        while ends < 4 {
+            let mut first = [0; 3];
+            first[(axis + 1) % 3] = side * (ends & 1);
+            first[(axis + 2) % 3] = side * (ends >> 1);
+            let mut end = [first[0] + 1, first[1] + 1, first[2] + 1];
+            end[axis] = side;
+            all.outer_edges[axis][ends] = bits(first, end);
+            ends += 1;
+        }
         axis += 1;
     }
     all
 }
 
-/// Of blocks of two and of four cells a side.
-static PLACES: [Places; 2] = [places(MOST_CELLS / 2), places(MOST_CELLS)];
+/// The corners of a block of `SIDE` cells a side: those that are inside.
+struct Block<const SIDE: usize>(u128);
 
-/// The corners of a block.
-struct Block {
-    /// Those that are inside.
-    corners: u128,
-    /// Cells along a side.
-    side: usize,
-    places: &'static Places,
-}
-
-/// The crossings of the edges of the block of `side` cells from `low`, if the surface in it is one disk that
-/// meets each side of the block in one arc at most, and meets each cell and each face once at most.
+/// The crossings of the edges of the block of two or four cells a side from `low`, if the surface in it is one
+/// disk that meets each side of the block in one arc at most, and meets each cell and each face once at most.
 pub fn disk_in_block(signs: &CornerBits, low: [usize; 3], side: usize) -> Option<EdgeCounts> {
-    let block = Block::of(signs, low, side);
-    let edges = block.edges();
-    let is_simple = Node::disk(edges).is_simple() && !block.meets_any_twice();
-    (is_simple && block.is_disk()).then_some(edges)
+    match side {
+        2 => Block::<2>::of(signs, low).disk(),
+        4 => Block::<4>::of(signs, low).disk(),
+        _ => None,
+    }
 }
 
-impl Block {
-    fn of(signs: &CornerBits, low: [usize; 3], side: usize) -> Self {
-        let of_row = (1 << (side + 1)) - 1;
+impl<const SIDE: usize> Block<SIDE> {
+    const PLACES: Places = places(SIDE);
+
+    #[inline]
+    fn of(signs: &CornerBits, low: [usize; 3]) -> Self {
+        let of_row = (1 << (SIDE + 1)) - 1;
         let mut corners = 0;
-        for z in 0..=side {
+        for z in 0..=SIDE {
             let first = (low[2] + z) * LINES + low[1];
-            let rows = &signs.rows[first..=first + side];
-            let plane =
-                rows.iter().rev().fold(0, |plane, row| plane << STEPS[1] | row >> low[0] & of_row);
+            let rows = &signs.rows[first..=first + SIDE];
+            let mut plane = 0;
+            for (y, row) in rows.iter().enumerate() {
+                plane |= (row >> low[0] & of_row) << (STEPS[1] * y);
+            }
             corners |= u128::from(plane) << (STEPS[2] * z);
         }
-        Self { corners, side, places: &PLACES[usize::from(side == MOST_CELLS)] }
+        Self(corners)
+    }
+
+    #[inline]
+    fn disk(&self) -> Option<EdgeCounts> {
+        let edges = self.edges();
+        let is_simple = Node::disk(edges).is_simple() && !self.meets_any_twice();
+        (is_simple && self.is_disk()).then_some(edges)
     }
 
     /// How often the edges of the block are crossed.
+    #[inline]
     fn edges(&self) -> EdgeCounts {
         let mut edges = EdgeCounts::default();
         for (axis, step) in STEPS.into_iter().enumerate() {
-            let crossed = self.corners ^ self.corners >> step;
-            let [u, v] = [(axis + 1) % 3, (axis + 2) % 3];
+            let crossed = self.0 ^ self.0 >> step;
             for ends in 0..4 {
-                let [high_u, high_v] = [ends & 1, ends >> 1];
-                let start = self.side * (high_u * STEPS[u] + high_v * STEPS[v]);
-                let along = crossed >> start & self.places.first_edges[axis];
+                let along = crossed & Self::PLACES.outer_edges[axis][ends];
                 // Seldom more than one.
                 let count = match along & along.wrapping_sub(1) {
                     0 => u64::from(along != 0),
                     _ => u64::from(along.count_ones()),
                 };
-                let corner = high_u << u | high_v << v;
+                let corner = (ends & 1) << ((axis + 1) % 3) | (ends >> 1) << ((axis + 2) % 3);
                 edges.add_to(edge_at_corner(corner as u8, axis as u8), count);
             }
         }
@@ -141,11 +150,12 @@ impl Block {
 
     /// Whether a face is ambiguous, or a cell has two pieces all the same: then two corners across from each
     /// other are alone on their side.
+    #[inline]
     fn meets_any_twice(&self) -> bool {
-        let c = self.corners;
+        let c = self.0;
         let ambiguous = (0..3).map(|axis| {
             let [u, v] = [STEPS[(axis + 1) % 3], STEPS[(axis + 2) % 3]];
-            (c ^ c >> u) & (c ^ c >> v) & !(c ^ c >> (u + v)) & self.places.faces[axis]
+            (c ^ c >> u) & (c ^ c >> v) & !(c ^ c >> (u + v)) & Self::PLACES.faces[axis]
         });
         let ambiguous = ambiguous.fold(0, |all, faces| all | faces);
         let of_cell: [u128; 8] = std::array::from_fn(|corner| {
@@ -159,12 +169,13 @@ impl Block {
             a & b & !any | !(a | b) & all
         });
         let apart = apart.fold(0, |all, cells| all | cells);
-        (ambiguous | apart & self.places.cells) != 0
+        (ambiguous | apart & Self::PLACES.cells) != 0
     }
 
     /// The places from which, a step along some axes, corners of both signs are reached.
+    #[inline]
     fn mixed(&self, axes: &[usize]) -> u128 {
-        let (mut any, mut all) = (self.corners, self.corners);
+        let (mut any, mut all) = (self.0, self.0);
         for axis in axes {
             any |= any >> STEPS[*axis];
             all &= all >> STEPS[*axis];
@@ -173,8 +184,9 @@ impl Block {
     }
 
     /// Whether the surface is one disk, if it is one in each of its cells.
+    #[inline]
     fn is_disk(&self) -> bool {
-        let places = self.places;
+        let places = Self::PLACES;
         let cells = self.mixed(&[0, 1, 2]) & places.cells;
         let faces = [[1, 2], [2, 0], [0, 1]].map(|axes| self.mixed(&axes));
         let faces = [0, 1, 2].map(|axis| faces[axis] & places.inner_faces[axis]);
