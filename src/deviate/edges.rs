@@ -15,8 +15,8 @@ use glam::{DVec3, Vec3};
 
 use crate::deviate::Means;
 use crate::deviate::creases::{Crease, Creases, SHARP_COSINE_SQUARED};
-use crate::deviate::reading::{Tape, hash_of};
-use crate::deviate::triangles::{BLOCK, Blocks, Triangle};
+use crate::deviate::reading::Tape;
+use crate::deviate::triangles::{BLOCK, Blocks, Measured, Triangle, hash_of};
 use crate::geom::mix;
 use crate::store::{Record, Sequence, Sorter, StoreError};
 
@@ -55,7 +55,7 @@ struct Pair {
     triangles: [u32; 2],
 }
 
-/// Edges whose second triangle has not come yet, as many as the table has places.
+/// Edges whose second triangle has not come yet, as many as the table has places: an even number.
 const WAITING: usize = 1 << 14;
 /// Marks of the edges that are sorted, by their hashes.
 const MARKS: usize = 1 << 22;
@@ -83,23 +83,12 @@ impl<'m> EdgeFinder<'m> {
     }
 
     /// Takes in the edges of the next triangle.
-    pub(crate) fn add(&mut self, triangle: &Triangle) -> Result<(), StoreError> {
-        let normal = triangle.normal();
-        if normal == DVec3::ZERO {
+    pub(crate) fn add(&mut self, measured: &Measured) -> Result<(), StoreError> {
+        if measured.normal == DVec3::ZERO {
             return Ok(());
         }
-        let normal = normal.normalize_or_zero();
-        for edge in EdgeUse::of(triangle, normal) {
-            let place = edge.hash as usize % WAITING;
-            let other = std::mem::replace(&mut self.waiting[place], edge);
-            if other.triangle == NOBODY {
-                continue;
-            }
-            if other.hash != edge.hash {
-                self.sort(other)?;
-                continue;
-            }
-            self.waiting[place].triangle = NOBODY;
+        for edge in EdgeUse::of(measured) {
+            let Some(other) = self.meet(edge)? else { continue };
             if edge.is_flat_with(&other) {
                 let triangles = [other.triangle, edge.triangle];
                 self.pairs.push(Pair { hash: edge.hash, triangles })?;
@@ -109,6 +98,29 @@ impl<'m> EdgeFinder<'m> {
             }
         }
         Ok(())
+    }
+
+    /// Takes out the use of the same edge that waits, or lets this one wait.
+    fn meet(&mut self, edge: EdgeUse) -> Result<Option<EdgeUse>, StoreError> {
+        let place = edge.hash as usize % WAITING;
+        // Either of two places serves. An edge that waits keeps its place as long as the other is free.
+        let places = [place, place ^ 1];
+        for place in places {
+            let other = self.waiting[place];
+            if other.hash == edge.hash && other.triangle != NOBODY {
+                self.waiting[place].triangle = NOBODY;
+                return Ok(Some(other));
+            }
+        }
+        let [one, other] = places.map(|place| self.waiting[place].triangle);
+        // The one that waits longest goes.
+        let is_first = one == NOBODY || other != NOBODY && one < other;
+        let place = places[usize::from(!is_first)];
+        let gone = std::mem::replace(&mut self.waiting[place], edge);
+        if gone.triangle != NOBODY {
+            self.sort(gone)?;
+        }
+        Ok(None)
     }
 
     fn sort(&mut self, edge: EdgeUse) -> Result<(), StoreError> {
@@ -178,10 +190,10 @@ fn judge(sorter: Sorter<EdgeUse>, tape: &Tape, means: &Means<'_>) -> Result<Crea
 }
 
 impl EdgeUse {
-    /// The three edges of a triangle with this unit normal.
-    fn of(triangle: &Triangle, normal: DVec3) -> [Self; 3] {
-        let hashes = triangle.corners.map(|corner| hash_of(&corner));
-        let normal = normal.as_vec3();
+    /// The three edges of a triangle.
+    fn of(measured: &Measured) -> [Self; 3] {
+        let Measured { triangle, normal, hashes, .. } = measured;
+        let normal = normal.normalize_or_zero().as_vec3();
         [0, 1, 2].map(|side| {
             let (_, is_turned) = ends(triangle, side);
             let (from, to) = (hashes[side], hashes[(side + 1) % 3]);

@@ -47,13 +47,14 @@ impl PartsSeen {
         means: &Means<'_>,
     ) -> Result<Self, DeviateError<S::Error>> {
         let mut extents = Table::<Extent>::new(means.scratch, means.share_bytes / 32);
-        let tape = read(source, means, |part, triangle| {
+        let tape = read(source, means, |part, measured| {
             let part = u64::from(part);
             while extents.len() <= part {
-                extents.push(Extent { first: u64::from(triangle.number), ..Extent::zeroed() })?;
+                let first = u64::from(measured.triangle.number);
+                extents.push(Extent { first, ..Extent::zeroed() })?;
             }
             let known = extents.get(part)?;
-            let area = known.area + triangle.normal().length() / 2.0;
+            let area = known.area + measured.area;
             extents.set(part, Extent { triangles: known.triangles + 1, area, ..known })
         })?;
         let mut hidden = Table::new(means.scratch, means.share_bytes / 32);

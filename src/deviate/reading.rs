@@ -6,18 +6,11 @@
 use glam::DVec3;
 
 use crate::deviate::runs::{Run, Runs};
-use crate::deviate::triangles::{BLOCK, Triangle, Triangles, each_of_soup};
+use crate::deviate::triangles::{BLOCK, Measured, Triangle, Triangles, each_of_soup};
 use crate::deviate::{DeviateError, Means};
-use crate::geom::mix_words;
 use crate::mesh::{MeshSource, TriangleBatch};
 use crate::octree::SoupSpool;
 use crate::store::{Sequence, StoreError};
-
-/// A hash of numbers, the same for both zeros.
-#[inline]
-pub(crate) fn hash_of(numbers: &[f64]) -> u64 {
-    mix_words(numbers.iter().map(|x| (x + 0.0).to_bits()))
-}
 
 /// A surface that was read.
 pub(crate) struct Tape<'s> {
@@ -52,13 +45,12 @@ impl Survey {
         Self { runs: Runs::new(means), low, high, area: 0.0 }
     }
 
-    fn add(&mut self, triangle: &Triangle) -> Result<(), StoreError> {
-        let [a, b, c] = triangle.points();
+    fn add(&mut self, measured: &Measured) -> Result<(), StoreError> {
+        let [a, b, c] = measured.triangle.points();
         let (low, high) = (a.min(b).min(c), a.max(b).max(c));
         (self.low, self.high) = (self.low.min(low), self.high.max(high));
-        let area = triangle.area();
-        self.area += area;
-        self.runs.add(triangle, [low, high], area)
+        self.area += measured.area;
+        self.runs.add(measured, [low, high])
     }
 
     fn finish(self, triangles: Triangles<'_>) -> Result<Tape<'_>, StoreError> {
@@ -80,17 +72,18 @@ impl TapeWriter {
         Self { triangles, survey: Survey::new(means) }
     }
 
-    /// Takes in a triangle with finite corners, and tells how it stands on the tape.
+    /// Takes in a triangle with finite corners, and tells what is known of it.
     pub(crate) fn push(
         &mut self,
         corners: &[[f64; 3]; 3],
         is_pane: bool,
-    ) -> Result<Triangle, StoreError> {
+    ) -> Result<Measured, StoreError> {
         let number = self.triangles.len() as u32;
         let triangle = Triangle { corners: *corners, number, is_pane: u32::from(is_pane) };
-        self.survey.add(&triangle)?;
+        let measured = Measured::new(triangle);
+        self.survey.add(&measured)?;
         self.triangles.push(triangle)?;
-        Ok(triangle)
+        Ok(measured)
     }
 
     /// All that came.
@@ -103,7 +96,7 @@ impl TapeWriter {
 pub(crate) fn survey_soup<'s>(
     spool: &'s SoupSpool,
     means: &Means<'_>,
-    mut note: impl FnMut(&Triangle) -> Result<(), StoreError>,
+    mut note: impl FnMut(&Measured) -> Result<(), StoreError>,
 ) -> Result<Tape<'s>, StoreError> {
     let mut survey = Survey::new(means);
     each_of_soup(spool, |triangle| {
@@ -111,8 +104,9 @@ pub(crate) fn survey_soup<'s>(
             means.stop_if_asked()?;
             means.monitor.advance((spool.len() - u64::from(triangle.number)).min(BLOCK as u64));
         }
-        survey.add(triangle)?;
-        note(triangle)
+        let measured = Measured::new(*triangle);
+        survey.add(&measured)?;
+        note(&measured)
     })?;
     survey.finish(Triangles::Spooled(spool))
 }
@@ -121,7 +115,7 @@ pub(crate) fn survey_soup<'s>(
 pub(crate) fn read<S: MeshSource + ?Sized>(
     source: &mut S,
     means: &Means<'_>,
-    mut note: impl FnMut(u32, &Triangle) -> Result<(), StoreError>,
+    mut note: impl FnMut(u32, &Measured) -> Result<(), StoreError>,
 ) -> Result<Tape<'static>, DeviateError<S::Error>> {
     let failed = |source| DeviateError::Source { source };
     let mut tape = TapeWriter::new(means);

@@ -12,10 +12,9 @@ use glam::DVec3;
 
 use crate::deviate::Means;
 use crate::deviate::pages::PAGE;
-use crate::deviate::reading::hash_of;
 use crate::deviate::tree::{Bounds, GROUP, Node};
-use crate::deviate::triangles::Triangle;
-use crate::geom::mix;
+use crate::deviate::triangles::Measured;
+use crate::geom::{mix, mix_words};
 use crate::store::{Sequence, StoreError};
 
 /// Triangles that follow each other in the file.
@@ -56,13 +55,13 @@ impl Runs {
         }
     }
 
-    /// Takes in the next triangle, which has this box and area.
+    /// Takes in the next triangle, which has this box.
     pub(crate) fn add(
         &mut self,
-        triangle: &Triangle,
+        measured: &Measured,
         [low, high]: [DVec3; 2],
-        area: f64,
     ) -> Result<(), StoreError> {
+        let triangle = &measured.triangle;
         let length = (high - low).max_element();
         let (both_low, both_high) = (self.low.min(low), self.high.max(high));
         let is_beside = (both_high - both_low).max_element() <= self.lengths + length;
@@ -80,8 +79,8 @@ impl Runs {
         }
         self.lengths += length;
         self.count += 1;
-        self.area += area;
-        let hash = hash_of(triangle.corners.as_flattened());
+        self.area += measured.area;
+        let hash = mix_words(measured.hashes);
         self.hash = mix(self.hash ^ hash ^ u64::from(triangle.is_pane));
         Ok(())
     }

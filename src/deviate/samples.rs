@@ -13,10 +13,10 @@ use glam::DVec3;
 
 use crate::deviate::Means;
 use crate::deviate::pages::Pages;
-use crate::deviate::reading::{Tape, hash_of};
+use crate::deviate::reading::Tape;
 use crate::deviate::runs::Run;
 use crate::deviate::tree::Curve;
-use crate::deviate::triangles::{BLOCK, Blocks, Triangle};
+use crate::deviate::triangles::{BLOCK, Blocks, Triangle, hash_of};
 use crate::geom::mix;
 use crate::store::{Record, Sequence, Sorter, StoreError};
 

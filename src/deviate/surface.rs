@@ -41,8 +41,8 @@ impl Surface<'static> {
         means: &Means<'_>,
     ) -> Result<Option<Self>, DeviateError<S::Error>> {
         let mut finder = options.creases.then(|| EdgeFinder::new(means));
-        let tape = read(source, means, |_, triangle| {
-            finder.as_mut().map_or(Ok(()), |finder| finder.add(triangle))
+        let tape = read(source, means, |_, measured| {
+            finder.as_mut().map_or(Ok(()), |finder| finder.add(measured))
         })?;
         Ok(Self::around(tape, finder, options, means)?)
     }
@@ -59,8 +59,8 @@ impl<'s> Surface<'s> {
         means: &Means<'_>,
     ) -> Result<Option<Self>, StoreError> {
         let mut finder = options.creases.then(|| EdgeFinder::new(means));
-        let tape = survey_soup(soup, means, |triangle| {
-            finder.as_mut().map_or(Ok(()), |finder| finder.add(triangle))
+        let tape = survey_soup(soup, means, |measured| {
+            finder.as_mut().map_or(Ok(()), |finder| finder.add(measured))
         })?;
         Self::around(tape, finder, options, means)
     }

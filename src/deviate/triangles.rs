@@ -6,6 +6,7 @@
 use bytemuck::{Pod, Zeroable};
 use glam::DVec3;
 
+use crate::geom::mix_words;
 use crate::octree::{SoupBlock, SoupSpool, SoupTriangle};
 use crate::store::{Sequence, StoreError};
 
@@ -30,12 +31,6 @@ impl Triangle {
         [DVec3::from_array(a), DVec3::from_array(b), DVec3::from_array(c)]
     }
 
-    /// Its area.
-    #[inline]
-    pub(crate) fn area(&self) -> f64 {
-        self.normal().length() / 2.0
-    }
-
     /// Its normal, twice as long as its area is large.
     #[inline]
     pub(crate) fn normal(&self) -> DVec3 {
@@ -48,6 +43,31 @@ impl Triangle {
         let is_pane = u32::from(triangle.is_pane());
         Self { corners: triangle.corners, number, is_pane }
     }
+}
+
+/// A triangle that comes, with what several ask of it.
+pub(crate) struct Measured {
+    pub(crate) triangle: Triangle,
+    /// Its normal, twice as long as its area is large.
+    pub(crate) normal: DVec3,
+    pub(crate) area: f64,
+    /// Of its corners.
+    pub(crate) hashes: [u64; 3],
+}
+
+impl Measured {
+    #[inline]
+    pub(crate) fn new(triangle: Triangle) -> Self {
+        let normal = triangle.normal();
+        let hashes = triangle.corners.map(|corner| hash_of(&corner));
+        Self { triangle, normal, area: normal.length() / 2.0, hashes }
+    }
+}
+
+/// A hash of numbers, the same for both zeros.
+#[inline]
+pub(crate) fn hash_of(numbers: &[f64; 3]) -> u64 {
+    mix_words(numbers.map(|x| (x + 0.0).to_bits()))
 }
 
 /// Records that are read some at a time.
