@@ -25,7 +25,9 @@ mod quadric;
 mod solve;
 
 pub use quadric::Qef;
-pub use solve::{Attempt, Waiting, begin, meet, solve, solve_flat, solve_smooth, solve_together};
+pub use solve::{
+    Attempt, Waiting, begin, meet, solve, solve_flat, solve_inside, solve_smooth, solve_together,
+};
 
 use glam::DVec3;
 

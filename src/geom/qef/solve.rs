@@ -44,13 +44,7 @@ pub struct Waiting {
 pub fn begin(hits: &[Hit], options: &QefOptions) -> Attempt {
     let bundle = Bundle::gather(hits);
     let mut qef = None;
-    let (path, free) = match bundle.normals {
-        0 => (Path::Mass, Some((bundle.mass_point, 0))),
-        1 => (Path::Plane, bundle.closed_form(options)),
-        2 => (Path::TwoPlanes, bundle.closed_form(options)),
-        3 => (Path::ThreePlanes, bundle.closed_form(options)),
-        _ => (Path::Ldl, full_rank(qef.insert(accumulate(hits)), bundle.mass_point, options)),
-    };
+    let (path, free) = by_cheap_paths(&bundle, hits, &mut qef, options);
     if let Some((free, rank)) = free {
         let position = bundle.with_exact_coordinates(free);
         if contains(options, position) {
@@ -59,6 +53,43 @@ pub fn begin(hits: &[Hit], options: &QefOptions) -> Attempt {
     }
     let qef = qef.unwrap_or_else(|| accumulate(hits));
     Attempt::Waiting(Waiting { qef, exact: bundle.exact, has_normals: bundle.normals > 0 })
+}
+
+/// The vertex, as if there were no box, and its rank, if a cheap path surely tells; with the sums that it
+/// took.
+#[inline]
+fn by_cheap_paths(
+    bundle: &Bundle,
+    hits: &[Hit],
+    qef: &mut Option<Qef>,
+    options: &QefOptions,
+) -> (Path, Option<(DVec3, u8)>) {
+    match bundle.normals {
+        0 => (Path::Mass, Some((bundle.mass_point, 0))),
+        1 => (Path::Plane, bundle.closed_form(options)),
+        2 => (Path::TwoPlanes, bundle.closed_form(options)),
+        3 => (Path::ThreePlanes, bundle.closed_form(options)),
+        _ => (Path::Ldl, full_rank(qef.insert(accumulate(hits)), bundle.mass_point, options)),
+    }
+}
+
+/// The vertex of [`solve`] if the box leaves it alone, sooner than that.
+#[inline]
+#[must_use]
+pub fn solve_inside(hits: &[Hit], options: &QefOptions) -> Option<DVec3> {
+    let bundle = Bundle::gather(hits);
+    let mut qef = None;
+    let (_, free) = by_cheap_paths(&bundle, hits, &mut qef, options);
+    let free = free.map_or_else(
+        || {
+            let qef = qef.unwrap_or_else(|| accumulate(hits));
+            let (spectrum, m) = (Spectrum::of(&qef.ata), qef.mass_point());
+            m + spectrum.solve(spectrum.rank(options.cutoff()), qef.residual(m))
+        },
+        |(free, _)| free,
+    );
+    let position = bundle.with_exact_coordinates(free);
+    contains(options, position).then_some(position)
 }
 
 /// Where up to three planes meet, one hit of each: the point of theirs nearest to the middle of the hits, if

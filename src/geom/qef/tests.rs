@@ -350,6 +350,37 @@ fn smooth_cells_are_solved_as_by_eigenvalues() {
 }
 
 #[test]
+fn what_the_box_leaves_alone_is_found_without_it_and_nothing_else() {
+    let mut dice = Dice(13);
+    let options = QefOptions::default();
+    let (mut inside, mut outside) = (0, 0);
+    for _ in 0..20_000 {
+        let count = (dice.roll() * 8.0) as usize;
+        // Flat, bent and wild cells, some with normals that are not known.
+        let (axis, tilt) = (dice.vector(), dice.roll() * 2.0);
+        let hits: Vec<Hit> = (0..count)
+            .map(|_| {
+                let normal = (axis + dice.vector() * tilt).normalize_or(DVec3::X);
+                let is_known = dice.roll() < 0.95;
+                let normal = if is_known { normal } else { DVec3::ZERO };
+                Hit { point: dice.vector() * 0.6, normal }
+            })
+            .collect();
+        let expected = solve(&hits, &options);
+        let found = solve_inside(&hits, &options);
+        assert_eq!(found.is_some(), !expected.clamped, "{hits:?}");
+        match found {
+            Some(found) => {
+                assert!((found - expected.position).length() < 1e-9, "{found:?} {expected:?}");
+                inside += 1;
+            }
+            None => outside += 1,
+        }
+    }
+    assert!(inside > 5000 && outside > 1000, "{inside} {outside}");
+}
+
+#[test]
 fn planes_meet_where_their_quadric_is_least_or_not_in_the_box() {
     let mut dice = Dice(11);
     let options = QefOptions::default();

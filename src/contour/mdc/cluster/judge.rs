@@ -156,11 +156,7 @@ impl Clustering {
         let reach = half - inset_units as f64 / cell_units as f64;
         let mut options = self.options.qef;
         (options.lo, options.hi) = (DVec3::splat(-reach), DVec3::splat(reach));
-        let solution = place(groups, planes, centre, middle, &options);
-        if solution.clamped {
-            return None;
-        }
-        let at = solution.position + centre;
+        let at = place(groups, planes, centre, middle, &options)? + centre;
         Some(std::array::from_fn(|a| {
             let low = low[a] as i64 * cell_units;
             let units = (at[a] * cell_units as f64).round() as i64;

@@ -10,7 +10,7 @@
 
 use glam::DVec3;
 
-use crate::geom::qef::{Hit, QefOptions, Solution, solve};
+use crate::geom::qef::{Hit, QefOptions, solve_inside};
 
 /// Most groups of planes that one vertex can stand for.
 pub const MAX_GROUPS: usize = 8;
@@ -238,20 +238,20 @@ pub fn add_group(
     has_room
 }
 
-/// Places the vertex of the groups in the box of `options` about `centre`; the middle of `points`
-/// where there are none.
+/// Places the vertex of the groups in the box of `options` about `centre`; in the middle of `points` where there
+/// are none. `None` if it lies outside.
 pub fn place(
     groups: &[Group],
     planes: &[CellPlane],
     centre: DVec3,
     middle: DVec3,
     options: &QefOptions,
-) -> Solution {
+) -> Option<DVec3> {
     let mut hits = [Hit { point: middle - centre, normal: DVec3::ZERO }; MAX_GROUPS];
     for (hit, group) in hits.iter_mut().zip(groups) {
         *hit = group.mean(planes, centre);
     }
-    solve(&hits[..groups.len().max(1)], options)
+    solve_inside(&hits[..groups.len().max(1)], options)
 }
 
 /// The largest distance of `vertex` to the planes of these groups, each of one plane; `None` if one is beyond

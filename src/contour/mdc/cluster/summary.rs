@@ -16,7 +16,7 @@ use glam::DVec3;
 use crate::contour::mdc::cluster::node::{EdgeCounts, Node};
 use crate::contour::mdc::cluster::planes::JUDGES_ONLY;
 use crate::contour::mdc::cluster::{CellPlane, ClusterOptions, Clustering, Leaves};
-use crate::geom::qef::{Hit, solve};
+use crate::geom::qef::{Hit, solve_inside};
 use crate::octree::{CellBrick, Facet, MAX_LEVEL, Summary};
 
 /// Most facets that one vertex can stand for.
@@ -174,11 +174,7 @@ fn place(facets: &[Facet], size: f64, options: &ClusterOptions) -> Option<([i64;
     if hits.is_empty() {
         return None;
     }
-    let solution = solve(&hits, &qef);
-    if solution.clamped {
-        return None;
-    }
-    let at = solution.position + half;
+    let at = solve_inside(&hits, &qef)? + half;
     let last = size as i64 * cell_units - inset_units;
     let vertex =
         [0, 1, 2].map(|a| ((at[a] * cell_units as f64).round() as i64).clamp(inset_units, last));
