@@ -2,7 +2,8 @@
 //!
 //! Units:      places in cells, positions in lattice units, both from the own brick's min corner;
 //!             a place may lie one cell outside.
-//! Memory:     [`Loaded`] for the own brick and for the sides of those around that were asked for.
+//! Memory:     [`Loaded`] for the own brick and for the sides of those around that were asked for, at most 27,
+//!             whose room the next ones take.
 //! Fails:      [`ContourError::Contradiction`] where sound bricks have a cell and these do not.
 
 use crate::contour::ContourError;

@@ -56,7 +56,10 @@ fn records_read_back_from_memory() {
 #[test]
 fn records_read_back_from_mapped_windows_and_after_reopening() {
     let (_folder, scratch, state) = on_disk();
-    check_reads_back(&BrickFile::open(&scratch, &state, 2).expect("open works"));
+    // One window in a map, two, three and four.
+    for cached_windows in [1, 2, 16, 24, 100] {
+        check_reads_back(&BrickFile::open(&scratch, &state, cached_windows).expect("open works"));
+    }
 }
 
 #[test]
