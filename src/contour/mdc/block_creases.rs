@@ -58,6 +58,7 @@ impl Workspace {
     /// Whether the surface passes a cell, as far as the corners of the brick tell.
     fn has_surface(&self, cell: [i32; 3]) -> bool {
         let last = SIDE as i32;
+        // Most are in the brick, and all their corners at once.
         if cell.iter().all(|c| (0..last).contains(c)) {
             return !matches!(self.signs.cell_mask(cell.map(|c| c as usize)), 0 | 255);
         }

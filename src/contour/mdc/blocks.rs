@@ -24,7 +24,7 @@ use crate::contour::mdc::features::Place;
 use crate::contour::mdc::plain::later;
 use crate::contour::mdc::workspace::{EdgeCrossing, Workspace};
 use crate::contour::{ContourError, ContourStats, SurfaceDetail};
-use crate::octree::{CellBrick, LINES, ROWS, SIDE};
+use crate::octree::{CellBrick, LINES, SIDE};
 
 /// Blocks with fewer cells are left to these.
 const FEWEST_CELLS: u32 = 4;
@@ -174,10 +174,7 @@ impl Workspace {
         if left == 0 {
             return true;
         }
-        // At most the first 32 edges of the row: fewer bits are counted faster.
-        let below = word as u32 & ((1_u64 << first) - 1) as u32;
-        let rank = self.row_starts[axis * ROWS + row] + below.count_ones();
-        let mut crossings = self.crossings[rank as usize..].iter();
+        let mut crossings = self.crossings[self.rank_of(axis, row, first)..].iter();
         while left != 0 {
             let at = first + left.trailing_zeros() as usize;
             left &= left - 1;

@@ -21,8 +21,6 @@ pub struct CutWalk<'r> {
     /// End of the cluster under way, in leaf numbers, and how many vertices it has.
     end: usize,
     count: u32,
-    /// That end, if it has one vertex.
-    end_of_one: usize,
     cut: CutCell,
 }
 
@@ -39,7 +37,6 @@ impl<'r> CutWalk<'r> {
             vertex: 0,
             end: 0,
             count: 0,
-            end_of_one: 0,
             cut,
         }
     }
@@ -77,7 +74,6 @@ impl<'r> CutWalk<'r> {
                 self.cluster += 1;
                 self.end = first + (1 << (3 * level));
                 self.count = cluster >> 18;
-                self.end_of_one = if self.count == 1 { self.end } else { 0 };
                 self.vertex += self.count;
                 let flagged = self.is_flagged(first);
                 self.cut = CutCell::new(first, level, flagged, self.count > 1);
@@ -97,7 +93,7 @@ impl<'r> CutWalk<'r> {
     /// step over.
     #[inline]
     pub fn is_in_one_vertex(&self, number: usize) -> bool {
-        number < self.end_of_one
+        number < self.end && self.count == 1
     }
 
     /// Which vertex of its cluster, which has several, the next component has.

@@ -216,10 +216,14 @@ impl Workspace {
     /// The crossing of a marked edge.
     #[inline]
     pub(super) fn crossing(&self, axis: usize, at: [usize; 3]) -> EdgeCrossing {
-        let row = at[2] * LINES + at[1];
+        self.crossings[self.rank_of(axis, at[2] * LINES + at[1], at[0])]
+    }
+
+    /// The number of the first crossing in a row of edges along `axis` that does not lie before `x`.
+    #[inline]
+    pub(super) fn rank_of(&self, axis: usize, row: usize, x: usize) -> usize {
         // At most the first 32 edges of the row: fewer bits are counted faster.
-        let below = self.marks.rows(axis)[row] as u32 & ((1_u64 << at[0]) - 1) as u32;
-        let rank = self.row_starts[axis * ROWS + row] + below.count_ones();
-        self.crossings[rank as usize]
+        let below = self.marks.rows(axis)[row] as u32 & ((1_u64 << x) - 1) as u32;
+        (self.row_starts[axis * ROWS + row] + below.count_ones()) as usize
     }
 }

@@ -95,11 +95,11 @@ struct Block<const SIDE: usize>(u128);
 /// The crossings of the edges of the block of two or four cells a side from `low`, if the surface in it is one
 /// disk that meets each side of the block in one arc at most, and meets each cell and each face once at most.
 pub fn disk_in_block(signs: &CornerBits, low: [usize; 3], side: usize) -> Option<EdgeCounts> {
-    match side {
-        2 => Block::<2>::of(signs, low).disk(),
-        4 => Block::<4>::of(signs, low).disk(),
-        _ => None,
+    if side == MOST_CELLS {
+        return Block::<MOST_CELLS>::of(signs, low).disk();
     }
+    assert_eq!(side, MOST_CELLS / 2, "blocks have two or four cells a side");
+    Block::<{ MOST_CELLS / 2 }>::of(signs, low).disk()
 }
 
 impl<const SIDE: usize> Block<SIDE> {
